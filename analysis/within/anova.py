@@ -150,6 +150,7 @@ def linear_anova(
     hypotheses, total = _hypotheses(cells, between, sum_of_squares)
     if not hypotheses:
         raise InputError("expected a factor or a covariate; add --within, --between or --covariate")
+    # Level names default to numbers from 1, as people count.
     names = levels or [[str(i + 1) for i in range(size)] for size in cells.shape[1:]]
     return AnovaResult(
         effects=effects_of(hypotheses, factors, sum(total.values()), confidence),
@@ -168,13 +169,18 @@ def _hypotheses(
     cells: Floats, between: BetweenDesign, sum_of_squares: int
 ) -> tuple[list[Hypothesis], dict[tuple[int, ...], float]]:
     """Every effect, those of fewer factors first, and the error sum of squares of every stratum."""
+    # Cells are rounded to eps of the largest; a sum of squares below what that rounding adds up to is noise,
+    # and an F from it would be a test of nothing.
     floor = cells.size * (8 * np.finfo(float).eps * float(np.abs(cells).max())) ** 2
     z, columns = contrast_scores(cells)
     basis, df = between.basis, len(z) - between.matrix.shape[1]
     residual = z - basis @ (basis.T @ z)
+    # Once more: the first projection leaves rounding of the size of the scores, the second removes it.
     residual -= basis @ (basis.T @ residual)
+    # Each term's scores along its directions are shared by every set of within contrasts: projected once.
     directed = [rows @ z for rows in term_directions(between, sum_of_squares)]
     squares = np.stack([np.einsum("ij,ij->j", one, one) for one in (residual, *directed)])
+    # Columns lie side by side, one stretch per set of contrasts: the sums of all strata in one pass.
     summed = np.add.reduceat(squares, [own.start for own in columns.values()], axis=1)
     hypotheses, total = [], {}
     for (members, own), (ss_error, *of_terms) in zip(
@@ -183,8 +189,10 @@ def _hypotheses(
         error = error_stratum(residual[:, own], members, df, ss_error)
         total[members] = ss_error
         for term, along, ss in zip(between.terms, directed, of_terms, strict=True):
+            # The grand mean against zero, without factors, is not an effect of the design.
             if term or members:
                 hypotheses.append(Hypothesis(term, error, ss, along[:, own]))
+    # Stable: effects of one order stay as the design has them.
     hypotheses.sort(key=lambda h: len(h.between) + len(h.error.members))
     return hypotheses, total
 

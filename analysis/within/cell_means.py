@@ -85,14 +85,17 @@ def cell_table(
         raise InputError("there are no ratings to analyze; the table has a header but no rows")
     person, people = level_codes(rows[participant], participant)
     coded = [level_codes(rows[name], name, (levels or {}).get(name)) for name in within]
+    # Each row's cell as one number in mixed radix: participants slowest, the last factor fastest.
     slot, shape = person, (len(people), *(len(names) for _, names in coded))
     for codes, names in coded:
         slot = slot * len(names) + codes
     values = rows[rating].to_numpy(dtype=np.float64)
     size = math.prod(shape)
+    # Counting by number is one pass however many factors there are; a pivot sorts all rows.
     counts = np.bincount(slot, minlength=size).reshape(shape)
     sums = np.asarray(np.bincount(slot, weights=values, minlength=size), dtype=np.float64).reshape(shape)
     table = _complete(people, list(within), [names for _, names in coded], sums, counts)
+    # Comparing single ratings takes long; only flat rows of cell means can be constant throughout.
     if not _flat(table).any():
         return table
     return replace(table, constant=_constant(table, people, person, values))
@@ -109,6 +112,7 @@ def _constant(table: CellTable, people: list[str], person: Integers, values: Flo
     """Participants of a table who gave one and the same rating throughout (and more than one)."""
     number = np.bincount(person)
     first = np.zeros(len(number))
+    # Written backward, so that the first rating of each participant is written last and stays.
     first[person[::-1]] = values[::-1]
     apart = np.abs(values - first[person]) > LAST_DIGITS * np.abs(first[person])
     constant = (np.bincount(person, weights=apart) == 0) & (number > 1)
@@ -128,6 +132,7 @@ def _complete(
         for i in np.flatnonzero(~whole)
     )
     if not whole.any():
+        # One row each does not come from missing data but from a wrong table (wide), or a wrong id column.
         if counts.reshape(len(counts), -1).sum(axis=1).max() == 1:
             raise InputError(
                 "each participant is in only one row, so nothing varies within participants. Is the table "
@@ -156,6 +161,7 @@ def _table(
         participants=tuple(people),
         factors=tuple(factors),
         levels=tuple(tuple(names) for names in levels),
+        # Every cell has a rating here, so no count is zero.
         y=sums / counts,
         counts=counts,
         dropped=dropped,
@@ -165,6 +171,7 @@ def _table(
 def _refuse_between_factors(factors: list[str], counts: Integers) -> None:
     """A factor of which everybody has one level alone lies between participants."""
     for axis, name in enumerate(factors, start=1):
+        # All axes but the participants' and the factor's own.
         others = tuple(other for other in range(1, counts.ndim) if other != axis)
         seen = (counts > 0).any(axis=others)
         if seen.shape[1] > 1 and (seen.sum(axis=1) <= 1).all():
@@ -179,6 +186,7 @@ def _case_alone(factors: list[str], levels: list[list[str]]) -> str:
     for name, own in zip(factors, levels, strict=True):
         by_letters: dict[str, str] = {}
         for level in own:
+            # The first spelling is kept, so that the message names both.
             if by_letters.setdefault(level.casefold(), level) != level:
                 return (
                     f"; levels '{by_letters[level.casefold()]}' and '{level}' of {name} differ only in case"

@@ -15,10 +15,12 @@ Floats = NDArray[np.float64]
 def orthonormal_basis(levels: int) -> Floats:
     """Orthogonal (levels, levels) matrix: first column 1/sqrt(levels), the others Helmert contrasts."""
     basis = np.zeros((levels, levels))
+    # The mean comes first, so that index 0 of each turned axis averages the factor away.
     basis[:, 0] = 1.0 / np.sqrt(levels)
     for j in range(1, levels):
         basis[:j, j] = 1.0 / np.sqrt(j * (j + 1))
         basis[j, j] = -j / np.sqrt(j * (j + 1))
+    # Shared by every caller through the cache: nobody may write into it.
     basis.setflags(write=False)
     return basis
 
@@ -42,6 +44,7 @@ def contrast_scores(y: Floats) -> tuple[Floats, dict[tuple[int, ...], slice]]:
     """
     n, k = len(y), y[0].size
     cells = y.reshape(n, k)
+    # Participants' means are taken out first: contrasts of large ratings would lose their last digits.
     people = cells.sum(axis=1) / k
     scores = cells - people[:, None]
     for size in y.shape[1:]:
@@ -49,6 +52,7 @@ def contrast_scores(y: Floats) -> tuple[Floats, dict[tuple[int, ...], slice]]:
         scores = np.swapaxes(scores.reshape(n, size, k // size), 1, 2) @ orthonormal_basis(size)
     order, columns = _by_effect(y.shape[1:])
     scores = scores.reshape(n, k)[:, order]
+    # In units of one cell, so that its sum of squares is comparable with those of the contrasts.
     scores[:, 0] = math.sqrt(k) * (people - people.sum() / n)
     return scores, columns
 

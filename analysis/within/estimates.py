@@ -48,11 +48,14 @@ class Margin:
         squaring, so that nothing cancels.
         """
         grid = weights.reshape(len(weights), len(self.rows), -1)
+        # `optimize` multiplies in the cheap order: without it the sum runs over all indices at once.
         estimates = np.einsum("cgw,gp,pw->c", grid, self.rows, self.fitted, optimize=True)
         spread = self.rows @ self.unscaled @ self.rows.T
+        # Each participant's contrast per group: small where ratings are large and agree.
         turned = np.einsum("nw,cgw->cng", self.residual, grid, optimize=True)
         squares = np.einsum("cng,cnh->cgh", turned, turned, optimize=True)
         variance = np.einsum("gh,cgh->c", spread, squares) / self.df
+        # Rounding may leave a variance just below 0.
         return estimates, np.sqrt(np.maximum(variance, 0.0))
 
     def tested(self, weights: Floats, scale: float) -> tuple[Floats, Floats, Floats]:
@@ -61,6 +64,7 @@ class Margin:
         An error that is only rounding is 0, and its t NaN: nobody differs.
         """
         estimates, errors = self.contrasts(weights)
+        # Averages of N ratings are rounded to about eps of them; a standard error divides that by sqrt(N).
         rounding = 16 * np.finfo(float).eps * scale / np.sqrt(self.df + 1)
         errors = np.where(errors > rounding, errors, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -90,6 +94,7 @@ def margin_of(result: AnovaResult, names: Sequence[str]) -> Margin:
     away = tuple(axis + 1 for axis in range(len(result.factors)) if axis not in members)
     means = result.y.mean(axis=away).reshape(result.n_participants, -1)
     x = design.matrix
+    # lstsq and not the normal equations: squaring X would lose digits of covariates with large means.
     fitted, *_ = np.linalg.lstsq(x, means, rcond=None)
     levels = [design.levels[k] for k in groups] + [result.levels[m] for m in members]
     ordered = (*(design.factors[k] for k in groups), *(result.factors[m] for m in members))
@@ -134,6 +139,7 @@ def margins_shown(n_factors: int) -> list[tuple[int, ...]]:
         return []
     margins = [m for order in (1, 2) for m in combinations(range(n_factors), order)]
     cells = tuple(range(n_factors))
+    # Cells of two factors are a margin already.
     return margins if cells in margins else [*margins, cells]
 
 

@@ -57,11 +57,13 @@ def bayes_factor(t: float, n: float, df: float, scale: float = PRIOR_SCALE) -> f
     """
     if not (np.isfinite(t) and np.isfinite(n)):
         return float("nan")
+    # g = 1 / z^2, so that the prior is a normal density in z.
     z2 = np.exp(2 * _LOG_Z)
     # log(1 + n r^2 / z^2), and what t says of each g against what it says of no difference
     inflation = np.log1p(n * scale**2 / z2)
     odds = (df + 1) / 2 * (np.log1p(t**2 / df) - np.log1p(t**2 / df * np.exp(-inflation)))
     log_terms = odds - inflation / 2 - z2 / 2 + _LOG_Z + np.log(2 * 0.02 / np.sqrt(2 * np.pi))
+    # Taken out before exp: for a large t the terms alone would pass the largest float.
     largest = float(log_terms.max())
     with np.errstate(over="ignore"):
         return float(np.exp(largest) * np.exp(log_terms - largest).sum())
@@ -107,10 +109,12 @@ def pairs_of(result: AnovaResult, factors: Sequence[str], confidence: float = 0.
     """All pairs of levels of the margin of `factors` (names, any order)."""
     margin = margin_of(result, factors)
     cells = margin.combinations
+    # Levels may hold a ':' themselves; the texts stay different all the same.
     names = cell_texts(cells)
     pairs = list(combinations(range(len(names)), 2))
     weights = np.zeros((len(pairs), len(names)))
     for row, (a, b) in enumerate(pairs):
+        # One contrast per pair: all pairs are then estimated by one product of matrices.
         weights[row, a], weights[row, b] = 1.0, -1.0
     labels = [((names[a], cells[a]), (names[b], cells[b])) for a, b in pairs]
     scale = float(np.abs(result.y).max())
@@ -148,8 +152,10 @@ def _tested(
     spread = _spread(margin, weights)
     with np.errstate(divide="ignore", invalid="ignore"):
         size, scale_of_t = (np.where(se > 0, values / spread, np.nan) for values in (estimate, se))
+    # The lower tail of -|t|: 1 - cdf would round the p of a large t to 0.
     p = 2 * special.stdtr(margin.df, -np.abs(t))
     family = [bonferroni(p), holm(p), sidak(p), tukey(t, len(margin.combinations), margin.df)]
+    # A pair that does not vary has no p value, adjusted or not.
     family = [np.where(np.isnan(p), np.nan, values) for values in (*family, false_discovery_rate(p))]
     sizes = size_intervals(t, scale_of_t, margin.df, confidence)
     reach = float(special.stdtrit(margin.df, 0.5 + confidence / 2)) * se
@@ -188,6 +194,7 @@ def size_intervals(t: Floats, scale: Floats, df: int, confidence: float) -> Floa
     """
     tails = np.array([0.5 + confidence / 2, 0.5 - confidence / 2])
     with np.errstate(invalid="ignore"):
+        # t of a pair that does not vary is NaN; scipy warns of it, and 0 is put in its place until the size is NaN.
         noncentral = special.nctdtrinc(float(df), tails, np.where(np.isnan(t), 0.0, t)[:, None])
         return np.asarray(noncentral * scale[:, None], dtype=np.float64)
 
@@ -197,6 +204,7 @@ def _spread(margin: Margin, weights: Floats) -> Floats:
 
     A difference of cells that differ in group and in level has neither: NaN.
     """
+    # Weights of groups x levels: those within a group sum to 0 over levels, those between over groups.
     groups = weights.reshape(len(weights), len(margin.rows), -1)
     inside = (groups.sum(axis=2) == 0).all(axis=1)
     across = (groups.sum(axis=1) == 0).all(axis=1)

@@ -50,11 +50,14 @@ def huynh_feldt(epsilon: float, contrasts: int, df_error: int) -> float:
 def mauchly_test(log_w: float, contrasts: int, df_error: int) -> Mauchly:
     """Mauchly's test of log W of q contrasts on the error df of participants."""
     q, nu = contrasts, df_error
+    # Box's correction of the degrees of freedom for small samples.
     rho = 1 - (2 * q**2 + q + 2) / (6 * q * nu)
+    # q (q + 1) / 2 variances and covariances, less the one scale that sphericity leaves free.
     chi2, df = -nu * rho * log_w, q * (q + 1) / 2 - 1
     # R's mauchly.test has 3k for 3q here (k cells); this is the textbook's form, so p differs by up to .003
     omega = (q + 2) * (q - 1) * (q - 2) * (2 * q**3 + 6 * q**2 + 3 * q + 2) / (288 * (nu * q * rho) ** 2)
     first, second = float(special.chdtrc(df, chi2)), float(special.chdtrc(df + 4, chi2))
+    # The second-order term may pass 0 or 1 in the tails, a probability may not.
     return Mauchly(math.exp(log_w), min(max(first + omega * (second - first), 0.0), 1.0))
 
 
@@ -129,14 +132,18 @@ def error_stratum(residual: Floats, members: tuple[int, ...], df: int, ss: float
     q = residual.shape[1]
     if ss == 0.0:
         return ErrorStratum(members, q, df, 0.0, math.nan, math.nan, None, residual, NO_ERROR)
+    # One contrast is spherical by definition, and its E is a number.
     if q == 1:
         return ErrorStratum(members, 1, df, ss, 1.0, 1.0, None, residual, None)
+    # eigvalsh: E is symmetric, and its eigenvalues must not come out complex.
     roots = np.asarray(np.linalg.eigvalsh(residual.T @ residual), dtype=np.float64)
     gg = greenhouse_geisser(roots)
     hf = huynh_feldt(gg, q, df)
+    # E has rank df at most: it is singular with certainty, whatever its rounded eigenvalues say.
     if df < q:
         reason = f"needs more participants than contrasts: error df = {df}, contrasts = {q}"
         return ErrorStratum(members, q, df, ss, gg, hf, None, residual, reason)
+    # Squaring the residuals loses half of the digits; they are only missed where E is near singular.
     if roots[0] > WELL_CONDITIONED * roots[-1]:
         log_det = float(np.log(roots).sum())
     elif (scaled := scaled_svd(residual)) is None:
@@ -153,6 +160,7 @@ def scaled_svd(residual: Floats) -> tuple[Floats, Floats, Floats] | None:
     None where E is singular. Their squares are those of E without the digits that squaring loses.
     """
     lengths = np.sqrt(np.einsum("ij,ij->j", residual, residual))
+    # A contrast in which nobody differs: dividing by its length would make noise of it.
     if (lengths <= SINGULAR_RATIO * lengths.max()).any():
         return None
     _, singular, right = np.linalg.svd(residual / lengths, full_matrices=False)
@@ -203,6 +211,7 @@ def univariate_tests(hypotheses: Sequence[Hypothesis]) -> list[UnivariateTest]:
     everything = [_f_and_df(h) for h in hypotheses]
     errors = [h.error for h in hypotheses]
     columns = np.array(everything, dtype=np.float64).T
+    # Three p values per effect in one call: each call of scipy costs more than the values.
     p_values = special.fdtrc(columns[1::2], columns[2::2], columns[0]).T.tolist()
     return [
         UnivariateTest(h.ss, e.ss, df1, df2, f, p, e.epsilon_gg, p_gg, e.epsilon_hf, p_hf, *corrected)
@@ -217,6 +226,7 @@ def _f_and_df(hypothesis: Hypothesis) -> tuple[float, int, int, float, float, fl
     error = hypothesis.error
     df1, df2 = hypothesis.rank * error.q, error.q * error.df
     f_value = (hypothesis.ss / df1) / (error.ss / df2) if error.ss else math.nan
+    # With few participants there is no Huynh-Feldt epsilon: its df stay uncorrected.
     gg, hf = error.epsilon_gg, 1.0 if math.isnan(error.epsilon_hf) else min(1.0, error.epsilon_hf)
     return f_value, df1, df2, gg * df1, gg * df2, hf * df1, hf * df2
 
@@ -236,6 +246,7 @@ def noncentrality(f_value: Floats, df_effect: Floats, df_error: Floats, tail: Fl
         np.array(a, dtype=np.float64) for a in np.broadcast_arrays(f_value, df_effect, df_error, tail)
     )
     solved = np.zeros_like(f)
+    # The distribution falls as L grows: below the target at L = 0, there is no root.
     rooted = special.ncfdtr(d1, d2, 0.0, f) > p
     if rooted.any():
         solved[rooted] = _newton(f[rooted], d1[rooted], d2[rooted], p[rooted])
@@ -256,9 +267,11 @@ def _newton(f: Floats, d1: Floats, d2: Floats, p: Floats) -> Floats:
 
     d1, d2 are the df of effect and error, L the noncentrality. A step that leaves the bracket halves it.
     """
+    # The mean of F' is near (d1 + L) / d1, so L is of the order of d1 F.
     low, high = np.zeros_like(f), d1 * f + 10.0
     while (short := special.ncfdtr(d1, d2, high, f) > p).any():
         high[short] *= 2.0
+    # A normal approximation to begin with, kept inside the bracket.
     guess = np.clip(d1 * f - special.ndtri(p) * np.sqrt(4.0 * d1 * f), 0.05 * high, 0.9 * high)
     for _ in range(_STEPS):
         cdf = special.ncfdtr(d1, d2, guess, f)
@@ -268,6 +281,7 @@ def _newton(f: Floats, d1: Floats, d2: Floats, p: Floats) -> Floats:
         slope = 0.5 * (special.ncfdtr(d1 + 2.0, d2, guess, f * d1 / (d1 + 2.0)) - cdf)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = guess - (cdf - p) / slope
+        # Also true where the slope is 0 or NaN: comparisons with NaN are false.
         bad = ~((step > low) & (step < high))
         following = np.where(bad, 0.5 * (low + high), step)
         done = np.abs(following - guess) <= _RELATIVE_CHANGE * following
@@ -296,6 +310,7 @@ def partial_eta_squared_ci(
     """
     f, d1, d2 = (np.atleast_1d(np.asarray(a, dtype=np.float64)) for a in (f_value, df_effect, df_error))
     interval = np.full((f.size, 2), np.nan)
+    # No F where the error is zero: its interval stays NaN.
     known = np.isfinite(f)
     tails = np.array([0.5 + confidence / 2, 0.5 - confidence / 2])
     size = noncentrality(f[known, None], d1[known, None], d2[known, None], tails)
