@@ -194,7 +194,7 @@ def size_intervals(t: Floats, scale: Floats, df: int, confidence: float) -> Floa
     """
     tails = np.array([0.5 + confidence / 2, 0.5 - confidence / 2])
     with np.errstate(invalid="ignore"):
-        # t of a pair that does not vary is NaN; scipy warns of it, and 0 is put in its place until the size is NaN.
+        # The t of a pair that does not vary is NaN, of which scipy warns; its size becomes NaN below.
         noncentral = special.nctdtrinc(float(df), tails, np.where(np.isnan(t), 0.0, t)[:, None])
         return np.asarray(noncentral * scale[:, None], dtype=np.float64)
 
