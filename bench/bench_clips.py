@@ -22,7 +22,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from bench.harness import say
 from experiments.load import load_experiment
-from stimuli_builder.characters import level_video
+from stimuli_builder.characters import atlas
 from stimuli_builder.characters.atlas import SHIPPED, decode_picture, load_atlas
 from stimuli_builder.characters.declaration import write_picture
 from stimuli_builder.clips.characters import find_character, shipped_names
@@ -148,7 +148,7 @@ READING = """
 import resource, sys, time
 import cv2
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
-from stimuli_builder.characters.level_video import decode_level_video
+from stimuli_builder.characters.atlas import decode_level_video
 from stimuli_builder.clips.characters import find_character
 import stimuli_builder.clips.characters
 
@@ -201,11 +201,11 @@ def test_levels_in_a_video(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     levels, megabytes, seconds = pictures
-    monkeypatch.setattr(level_video, "QUANTISER", quantiser)
-    level_video.write_level_video(tmp_path, "levels.mkv", levels)
+    monkeypatch.setattr(atlas, "QUANTISER", quantiser)
+    atlas.write_level_video(tmp_path, "levels.mkv", levels)
     content = (tmp_path / "levels.mkv").read_bytes()
     began = time.process_time()
-    frames = level_video.decode_level_video(content, "levels", "levels.mkv")
+    frames = atlas.decode_level_video(content, "levels", "levels.mkv")
     took = time.process_time() - began
     worst = min(psnr_db(a, b) for a, b in zip(frames, levels, strict=True))
     error = max(int(np.abs(a.astype(int) - b).max()) for a, b in zip(frames, levels, strict=True))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
+from stimuli_builder.characters.atlas import write_level_video
 from stimuli_builder.characters.declaration import (
     Declaration,
     Level,
@@ -17,7 +18,6 @@ from stimuli_builder.characters.declaration import (
     write_declaration,
     write_picture,
 )
-from stimuli_builder.characters.level_video import write_level_video
 from stimuli_builder.characters.recording import LUMA, Image, StillFrames, Values, decibels, gray_codes
 from stimuli_builder.tracking.mesh import reduce_picture
 from stimuli_builder.tracking.model import CoupledModel, with_residual_limits

@@ -24,6 +24,7 @@ from face_baking.plan import closures_of
 from face_baking.pose_motion import pose_between
 from face_baking.renderer import Shot
 from face_baking.scene import FaceScene
+from stimuli_builder.characters.atlas import write_level_video
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import (
     Declaration,
@@ -35,7 +36,6 @@ from stimuli_builder.characters.declaration import (
     write_declaration,
     write_picture,
 )
-from stimuli_builder.characters.level_video import write_level_video
 
 STUDIO_EV = 0.15
 STEADY_CODE = 0.03

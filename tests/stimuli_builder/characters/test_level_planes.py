@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from stimuli_builder.characters.atlas import decode_level_video, write_level_video
 from stimuli_builder.characters.colour import picture_of, planes_of
-from stimuli_builder.characters.level_video import decode_level_video, write_level_video
 
 CORNERS = np.array([[[r, g, b] for r in (0, 255) for g in (0, 255) for b in (0, 255)]], np.uint8)
 

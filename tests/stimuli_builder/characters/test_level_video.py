@@ -7,7 +7,7 @@ import pytest
 from face_baking.development import psnr_db
 
 from experiments.errors import InputError
-from stimuli_builder.characters.atlas import load_atlas
+from stimuli_builder.characters.atlas import decode_level_video, load_atlas, write_level_video
 from stimuli_builder.characters.colour import linear_to_srgb, srgb_to_linear
 from stimuli_builder.characters.declaration import (
     CLOSURES,
@@ -18,7 +18,6 @@ from stimuli_builder.characters.declaration import (
     read_declaration,
     write_declaration,
 )
-from stimuli_builder.characters.level_video import decode_level_video, write_level_video
 from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.levels import quantise_light
 
