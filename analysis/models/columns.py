@@ -161,6 +161,7 @@ def _grouping(rows: pd.DataFrame, columns: list[str], name: str, what: str) -> G
 
 def _refuse_same(group: Grouping, before: list[Grouping]) -> None:
     for other in before:
+        # Distinct pairs of codes: as many as either has levels means that each level has one partner.
         pairs = len(np.unique(group.codes * len(other.names) + other.codes))
         if pairs == len(group.names) == len(other.names):
             raise InputError(f"'{group.name}' groups the rows exactly as '{other.name}' does; remove one")

@@ -56,12 +56,14 @@ def coded_cells(
         for axis, size in enumerate(sizes):
             inside = axis in members
             codings = np.asarray(np.kron(codings, _sum_coding(size)[:, 1:] if inside else np.ones((size, 1))))
+            # Columns of unit variance, so that SDs of slopes of different factors can be compared.
             basis = orthonormal_basis(size) * np.sqrt(size)
             bases = np.asarray(np.kron(bases, basis[:, 1:] if inside else np.ones((size, 1))))
         fixed.append(codings)
         spread.append(bases)
         effect = effect_name([factors[m] for m in members])
         effect_of += [effect] * codings.shape[1]
+        # Sum coding has a column for every level but the last, which is minus the sum of the others.
         inner = product(*[levels[m][:-1] for m in members])
         names += [
             ":".join(f"{factors[m]}[{lv}]" for m, lv in zip(members, row, strict=True)) for row in inner
@@ -236,6 +238,7 @@ class ModelData:
         for factor, names in zip(self.factors, self.levels, strict=True):
             size = len(names)
             from_first = np.hstack([-np.ones((size - 1, 1)), np.eye(size - 1)])
+            # Factors outside the effect are averaged with equal weights, however many ratings each level has.
             rows = np.asarray(
                 np.kron(rows, from_first if factor in members else np.full((1, size), 1 / size))
             )
@@ -276,10 +279,12 @@ class ModelData:
         of_column = [effect for effect in effects for _ in self.columns(effect)]
         p = len(of_column)
         if slopes == "correlated":
+            # One theta per entry of a lower triangle L: the covariance L L' cannot become indefinite.
             rows, others = np.tril_indices(p)
             patterns = np.zeros((len(rows), p, p))
             patterns[np.arange(len(rows)), rows, others] = 1.0
         else:
+            # One theta per effect: its columns share it, so that the fit does not depend on their coding.
             patterns = np.stack([np.diag([float(e == name) for name in of_column]) for e in effects])
             shared = [of_column.index(name) for name in self.correlated_effects(effects)]
             pairs = [(row, column) for i, row in enumerate(shared) for column in shared[:i]]
@@ -334,6 +339,7 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
         _refuse_empty_cells(cell, factors, levels)
     fixed, spread, effect_of, names = coded_cells(list(factors), levels)
     if terms.effects is not None:
+        # As sets, since a:b and b:a are one effect; the empty set is the intercept.
         known = {frozenset(), *(frozenset(name.split(":")) for name in terms.effects)}
         has = [frozenset(name.split(":")) - {"intercept"} in known for name in effect_of]
         fixed, spread = fixed[:, has], spread[:, has]
@@ -367,6 +373,7 @@ def _number_effects(
 ) -> tuple[NumberEffect, ...]:
     """Covariates, then their interactions; which of them vary within participants."""
     each = pd.DataFrame(numbers, columns=list(terms.covariates)).groupby(people).nunique()
+    # In more than one participant: a slope that a single one determines has no variance.
     inside = {name for name in terms.covariates if int((each[name] > 1).sum()) > 1} | set(terms.within)
     effects = []
     for members in (*((name,) for name in terms.covariates), *terms.interactions):
@@ -433,8 +440,11 @@ def _refuse_collinear(data: ModelData) -> None:
     if not data.terms.covariates and data.terms.effects is None:
         return
     x = data.x
+    # At unit length: a covariate in small units would look like a combination of the others.
     scaled = x / np.linalg.norm(x, axis=0)
+    # Of the products (f, f), not of x (n, f): singular values come squared, hence the small tolerance.
     if np.linalg.matrix_rank(scaled.T @ scaled, tol=1e-10) < x.shape[1]:
+        # A cell that nobody rated makes effects dependent as well, and is the plainer reason to name.
         if data.terms.effects is not None:
             _refuse_empty_cells(data.cell, data.factors, data.levels)
         raise InputError(
@@ -513,6 +523,7 @@ def refuse_group_slopes(data: ModelData) -> None:
                     f"{group.name}; write it outside the brackets only"
                 )
         own = 1 + sum(len(data.columns(effect)) for effect in effects)
+        # As many coefficients as ratings would leave no residual to test against.
         if effects and own * len(group.names) >= len(data.rating):
             raise InputError(
                 f"the slopes by {group.name} are not determined: they have {own * len(group.names)} "
@@ -546,6 +557,7 @@ def _without_residual_slopes(data: ModelData, effects: list[str]) -> tuple[list[
     people, ratings = len(data.participants.names), len(data.rating)
     numbers = {effect.name for effect in data.number_effects}
     kept, said = list(effects), []
+    # From the last on: interactions of covariates give way before the covariates themselves.
     for name in reversed([effect for effect in effects if effect in numbers]):
         own = sum(len(data.columns(effect)) for effect in kept)
         if own * people < ratings:

@@ -111,12 +111,15 @@ def uncertainty(c: CrossProducts, theta: Floats, at: Criterion) -> Uncertainty:
     hessian = np.empty((m + 1, m + 1))
     for row, k in enumerate(free):
         hessian[row, :m] = _derivative(c, theta, int(k), sigma)[free]
+    # Differences leave the two triangles apart by their error, and eigh reads only one of them.
     hessian[:m, :m] = (hessian[:m, :m] + hessian[:m, :m].T) / 2
     hessian[m, :m] = hessian[:m, m] = -2 * at.grad_r2[free] / sigma**3
     hessian[m, m] = 4 * nu / sigma**2
+    # In steps of the parameters' own sizes: whether a direction is level must not depend on units.
     steps = np.append(np.maximum(np.abs(theta[free]), LEAST_THETA), sigma)
     values, vectors = np.linalg.eigh(hessian * np.outer(steps, steps))
     directions, least = steps[:, None] * vectors, FLAT * values.max()
+    # Only curved directions: the inverse of a level one would be rounding of any size.
     good = values > least
     parameters = 2 * (directions[:, good] / values[good]) @ directions[:, good].T
     gradient = np.concatenate(
@@ -136,15 +139,18 @@ def _derivative(c: CrossProducts, theta: Floats, k: int, sigma: float) -> Floats
         a, b = criterion(c, up), criterion(c, down)
         return ((a.grad_h - b.grad_h) + (a.grad_r2 - b.grad_r2) / sigma**2) / (2 * step)
 
+    # A theta near zero still needs a step that moves the criterion.
     step = STEP * max(abs(float(theta[k])), 0.05)
     if c.cc.shape[0] > COSTLY:
         return slope(step / 2)
+    # Richardson's extrapolation: the error in the square of the step cancels.
     return (4 * slope(step / 2) - slope(step)) / 3
 
 
 def _pooled(each: Floats) -> float:
     if len(each) == 1 or np.ptp(each) < 1e-8:
         return float(each.mean())
+    # With 2 error df or fewer F has no mean to pool by; lmerTest takes 2 there as well.
     if (each <= 2).any():
         return 2.0
     expected = float((each / (each - 2)).sum())
@@ -320,6 +326,7 @@ def kenward_roger(terms: Sequence[Term], c: CrossProducts, theta: Floats, at: Cr
 
 def _inverse(information: Floats) -> Floats:
     """Inverse of an information matrix; what carries none (a pattern that two terms share) stays out."""
+    # To a unit diagonal, so that the cutoff does not depend on the sizes of the variances.
     unit = 1 / np.sqrt(np.diag(information))
     return np.asarray(
         np.linalg.pinv(information * np.outer(unit, unit), rcond=1e-10, hermitian=True)
@@ -333,6 +340,7 @@ def _inner(terms: Sequence[Term], factors: Sequence[Floats]) -> Floats:
     spread = linalg.block_diag(
         *(np.kron(np.eye(t.levels), one) for t, one in zip(terms, factors, strict=True))
     )
+    # The matrix to factor, I + L'Z'Z L, is as large as the coefficients; V is as large as the ratings.
     half = spread.T @ products
     lower = np.linalg.cholesky(np.eye(len(half)) + half @ spread)
     solved = linalg.solve_triangular(lower, half, lower=True, check_finite=False)
@@ -351,6 +359,7 @@ def _directions(terms: Sequence[Term]) -> Iterator[_Direction]:
     """A direction for each variance (a pattern on the diagonal) and each covariance (one below it)."""
     for number, term in enumerate(terms):
         for pattern in term.patterns:
+            # A covariance is in the matrix twice, below the diagonal and above it.
             yield _Direction(number, np.maximum(pattern, pattern.T))
 
 

@@ -82,6 +82,7 @@ def parse_formula(text: str) -> Formula:
         RandomPart(_effects_of(effects, text), bar == "|", _grouping_of(grouping, text))
         for effects, bar, grouping in _RANDOM.findall(right)
     )
+    # A bracket becomes the intercept, so that the pluses around it stay a valid sum.
     fixed = _effects_of(_RANDOM.sub("1", right), text)
     if not random:
         raise InputError(f"'{text}' has no random term; add one, such as (1 | participant)")
@@ -125,6 +126,7 @@ def model_options(formula: Formula, header: Sequence[str], numeric: Collection[s
             raise InputError(
                 f"the nested grouping {part.grouping} has no slopes; write (1 | {part.grouping})"
             )
+    # The grouping whose slopes correlate, else one with slopes, else the first takes the participants' part.
     people = (correlated or with_slopes or list(formula.random))[0]
     if "/" in people.grouping:
         raise InputError(f"name another grouping before the nested {people.grouping}")

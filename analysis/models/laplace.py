@@ -80,6 +80,7 @@ class CrossedHessian:
                 w = weight * scaled[:, row] * scaled[:, column]
                 a[:, row, column] = a[:, column, row] = np.bincount(data.participant, weights=w, minlength=n)
         a += np.eye(c)
+        # One number per pair of participant and item, so that a single pass sums the trials of each.
         pair = data.participant * j + data.item
         b = np.stack([np.bincount(pair, weights=weight * z, minlength=n * j) for z in scaled.T], axis=1)
         self.b = sd_item * b.reshape(n, j, c).transpose(0, 2, 1).reshape(n * c, j)
@@ -142,8 +143,10 @@ class Trials:
         edges = np.concatenate([[-np.inf], thresholds, [np.inf]])
         a, b = edges[category + 1] - eta, edges[category] - eta
         self.upper, self.lower = special.expit(a), special.expit(b)
+        # Not 1 - upper, which is 0 in double precision from a = 37 on.
         self.above = special.expit(-a)
         self.f_upper, self.f_lower = self.upper * self.above, self.lower * special.expit(-b)
+        # exp(b - a) from the edges alone: eta cancels, and an open end gives 0.
         gap = np.exp(-(edges[category + 1] - edges[category]))
         self.log_likelihood = float((special.log_expit(a) + special.log_expit(-b) + np.log1p(-gap)).sum())
         self.between = gap / (1 - gap)
@@ -215,6 +218,7 @@ class LaplaceLikelihood:
             u, v = at[0] + length * step[0], at[1] + length * step[1]
             trial = self._trials(p, u, v)
             reached = trial.log_likelihood - ((u**2).sum() + v @ v) / 2
+            # Near the mode the density changes by less than its rounding: steps must not be halved for that.
             if reached >= value - 1e-9 * abs(value) or length < 1e-6:
                 return u, v, trial, reached
             length /= 2

@@ -114,6 +114,7 @@ def model_means(
             means.append(ModelMean(name, levels, value, se, df, _interval(value, se, df)))
         pairs += _pairs(name, cells, estimated, bounds)
     for effect in data.number_effects:
+        # Interactions with factors are in the trends at their levels; products of covariates have no slope.
         if len(effect.covariates) > 1 or effect.factors:
             continue
         with_factors = [e.factors for e in data.number_effects if e.covariates == effect.covariates]
@@ -132,6 +133,7 @@ def ratio_tests(data: ModelData, chi2_without: Callable[[NDArray[np.int64]], flo
     tests = []
     for effect in data.effects:
         columns = data.columns(effect)
+        # Two searches end within their tolerance: the difference may come out slightly below zero.
         chi2 = max(0.0, chi2_without(columns))
         tests.append(RatioTest(effect, chi2, len(columns), float(stats.chi2.sf(chi2, len(columns)))))
     return tuple(tests)

@@ -52,6 +52,7 @@ def refused_where_exact(data: ModelData, terms: Sequence[Term]) -> Iterator[None
     try:
         yield
     except (np.linalg.LinAlgError, ZeroDivisionError) as error:
+        # Random terms as if they were fixed: where nothing is left over, they predict every rating.
         columns = sparse.hstack([sparse.csr_matrix(data.x), *(term.matrix() for term in terms)], format="csr")
         residual = float(linalg.lsqr(columns, data.rating, atol=1e-12, btol=1e-12)[3])
         if residual > EXACT * float(np.linalg.norm(data.rating - data.rating.mean())):
@@ -227,6 +228,7 @@ def _result(
 
     def estimated(contrast: Floats) -> Estimate:
         df = spread.f_test(at.beta, contrast[None])[2]
+        # Only the intercept's column carries the origin that was taken off the ratings.
         value = float(contrast @ at.beta) * units.scale + float(contrast[0]) * units.middle
         return value, float(np.sqrt(contrast @ spread.covariance @ contrast)) * units.scale, df
 
@@ -244,6 +246,7 @@ def _result(
         effects=effects,
         coefficients=tuple(_coefficients(data, at.beta, spread, units)),
         components=components,
+        # A density changes with the unit of the ratings: by log(scale) for each of the nu residual df.
         reml_criterion=at.value + 2 * at.nu * np.log(units.scale),
         sigma=sigma,
         theta=tuple(float(t) for t in theta),

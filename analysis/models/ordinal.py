@@ -117,6 +117,7 @@ def ordinal_result(
     """Coefficients, joint tests and SDs at the maximum; notes of what was left out precede its own."""
     p = maximum.parameters
     first = len(p.thresholds)
+    # `Maximum.covariance` is of thresholds, then coefficients, then SDs.
     block = maximum.covariance[first : -len(p.sd), first : -len(p.sd)]
     components = _components(p, terms, data)
     parameters = first + len(p.beta) + len(components)
@@ -144,6 +145,7 @@ def ordinal_result(
 
 def _coefficients(data: ModelData, beta: Floats, covariance: Floats) -> tuple[OrdinalCoefficient, ...]:
     se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    # Without the intercept, whose part the thresholds play.
     return tuple(
         OrdinalCoefficient(name, float(b), float(s), float(b / s), float(2 * special.ndtr(-abs(b / s))))
         for name, b, s in zip(data.column_names[1:], beta, se, strict=True)
@@ -153,6 +155,7 @@ def _coefficients(data: ModelData, beta: Floats, covariance: Floats) -> tuple[Or
 def _effects(data: ModelData, beta: Floats, covariance: Floats) -> tuple[OrdinalEffect, ...]:
     effects = []
     for effect in data.effects:
+        # Columns of the ordinal model are numbered without the intercept.
         columns = data.columns(effect) - 1
         chi2 = float(beta[columns] @ np.linalg.solve(covariance[np.ix_(columns, columns)], beta[columns]))
         effects.append(OrdinalEffect(effect, chi2, len(columns), float(special.chdtrc(len(columns), chi2))))
@@ -228,6 +231,7 @@ def separated_columns(data: ModelData) -> list[str]:
     """
     categories, codes = np.unique(data.rating, return_inverse=True)
     k, x = len(categories) - 1, data.x[:, 1:]
+    # Equal trials add no constraint; columns of size 1 keep the solver's tolerance meaningful.
     distinct = np.unique(np.column_stack([codes, x / np.abs(x).max(axis=0)]), axis=0)
     code, rows = distinct[:, 0].astype(np.int64), distinct[:, 1:]
     of_threshold = np.eye(k)
@@ -240,6 +244,7 @@ def separated_columns(data: ModelData) -> list[str]:
         ]
     )
     # thresholds alone cannot raise a likelihood: every category was given
+    # Bounded: every multiple of such a direction is one too, and the program would have no end.
     solution = optimize.linprog(-slack.sum(axis=0), A_ub=-slack, b_ub=np.zeros(len(slack)), bounds=(-1, 1))
     if solution.x is None or solution.fun is None or solution.fun > -1e-6:
         return []
@@ -383,6 +388,7 @@ def _by_enough_nodes(ordinal: OrdinalData, start: Maximum) -> tuple[Maximum, int
     maximum = start
     for nodes, more in zip(NODE_LADDER, (*NODE_LADDER[1:], MAX_NODES), strict=True):
         maximum = maximise(QuadratureLikelihood(ordinal, nodes), maximum.parameters, False)
+        # One Newton step of the finer likelihood shows the distance, without a second maximization.
         moved = np.abs(newton_step(QuadratureLikelihood(ordinal, more), maximum))
         errors = np.sqrt(np.maximum(np.diag(maximum.covariance), 0.0))
         if (moved <= SETTLED * errors).all():
@@ -440,6 +446,7 @@ def _refuse_quadrature(nodes: int, items: Sequence[str], slopes: Slopes) -> None
 def _refuse_undetermined(data: ModelData, variances: Floats) -> None:
     # A flat likelihood has no curvature: the estimate is where the search stopped, and its error unknown.
     names = data.column_names[1:]
+    # Written so that NaN counts as undetermined too.
     undetermined = [name for name, v in zip(names, variances, strict=True) if not v > 0]
     if undetermined and (separated := separated_columns(data)):
         raise InputError(_separated(separated))
@@ -471,6 +478,7 @@ def _ordinal_data(data: ModelData, codes: Integers, n_categories: int, groups: S
         term.astype(np.int64),
         codes,
         people.codes,
+        # Without items all trials share one, whose SD is held at zero.
         np.zeros(len(codes), np.int64) if items is None else items.codes,
         n_categories,
         len(people.names),

@@ -61,6 +61,7 @@ class QuadratureLikelihood:
         gap = np.exp(bottom - top)[:, None]
         each = special.log_expit(a) + special.log_expit(-b) + np.log1p(-gap)
         joint = self._summed(each) - u**2 / 2 + self._log_weight
+        # In logarithms: the likelihood of many ratings underflows at every node.
         of_people = special.logsumexp(joint, axis=1)
         share = np.exp(joint - of_people[:, None])
         between = gap / (1 - gap)
@@ -177,11 +178,13 @@ def maximise(likelihood: Likelihood, start: Parameters, with_items: bool) -> Max
 
 def _pack(p: Parameters) -> Floats:
     """First threshold, logs of the gaps between thresholds, coefficients, SDs."""
+    # Logs of the gaps keep the thresholds in order, whatever the search tries.
     return np.concatenate([p.thresholds[:1], np.log(np.diff(p.thresholds)), p.beta, p.sd])
 
 
 def packed_gradient(gradient: Parameters, log_gaps: Floats) -> Floats:
     """Gradient by the first threshold, the logs of the gaps between thresholds, coefficients, SDs."""
+    # The first threshold and every gap move all thresholds after them.
     later = np.cumsum(gradient.thresholds[::-1])[::-1]
     return np.concatenate([later[:1], later[1:] * np.exp(log_gaps), gradient.beta, gradient.sd])
 
@@ -259,8 +262,10 @@ class _Search:
             value, gradient = self.at(packed)
             free = np.flatnonzero(~(self.is_sd & (packed == 0)))
             information = self._information(packed, free)
+            # What is at a bound stays there: a step that is cut off afterwards is not Newton's any more.
             inside = (packed > self.low)[free] & (packed < self.high)[free]
             step = _newton_step(information[np.ix_(inside, inside)], gradient[free][inside])
+            # What a quadratic likelihood gains by the step.
             gain = 0.0 if step is None else float(step @ gradient[free][inside]) / 2
             if left == 0 or step is None or gain < NEWTON_GAIN:
                 break
@@ -337,6 +342,7 @@ def laplace_step(data: OrdinalData, maximum: Maximum, with_items: bool) -> Float
     people = _lacking(
         replace(
             data,
+            # Items at their modes are one more column, whose coefficient is 1.
             x=np.column_stack([data.x, p.sd[-1] * v[data.item]]),
             item=np.zeros_like(data.item),
             n_items=1,
@@ -393,6 +399,7 @@ def _points(dimensions: int) -> tuple[Floats, Floats]:
         root = (1 + root) ** (1 / (dimensions + 1))
     steps = root ** -np.arange(1.0, dimensions + 1)
     uniform = (0.5 + np.arange(1, LATTICE + 1)[:, None] * steps) % 1.0
+    # The normal quantile of 0 or 1 is infinite.
     half = special.ndtri(np.clip(uniform, 1e-12, 1 - 1e-12)) * np.sqrt(WIDER)
     # mirrored and whitened: exact for a normal posterior, where Laplace's approximation is exact too
     points = np.concatenate([half, -half])
@@ -406,6 +413,7 @@ def _by_points(d: OrdinalData, p: Parameters, laplace: LaplaceLikelihood) -> Par
     """Gradient of the log-likelihood, each level's integral by points laid on its mode and spread."""
     spreads = laplace.spreads(p)
     e, log_weight = _points(d.z.shape[1])
+    # The weights are of standard normal points, whose density is divided out again.
     log_weight = log_weight + (e**2).sum(axis=1) / 2
     edges = np.concatenate([[-np.inf], p.thresholds, [np.inf]])
     by_edge, beta, by_column = np.zeros(d.n_categories + 1), np.zeros(d.x.shape[1]), np.zeros(d.z.shape[1])

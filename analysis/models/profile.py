@@ -96,6 +96,7 @@ class Profile:
     def sigma(self) -> tuple[float, float]:
         """Interval of the residual standard deviation."""
         estimate = self._best.sigma
+        # The asymptotic standard error of a standard deviation: only the first step of the search.
         se = estimate / np.sqrt(2 * self._c.n)
 
         def fit(value: float, starts: Sequence[Floats]) -> Fit:
@@ -119,6 +120,7 @@ class Profile:
         def fit(value: float, starts: Sequence[Floats]) -> Fit:
             return self._held(k, value, starts)
 
+        # Where the deviance has not risen enough at zero, zero lies within the interval.
         if estimate > 0 and fit(0.0, starts)[1] - self._least > self._rise:
             low = self._end(fit, starts, estimate, -min(step, estimate / 2), floor=0.0)
         return low, self._end(fit, starts, estimate, step)
@@ -133,6 +135,7 @@ class Profile:
             theta[others], theta[k] = packed[1:], value / sigma
             at = criterion(self._c, theta, reml=False)
             by_theta = at.grad_h + at.grad_r2 / sigma**2
+            # By log sigma; the last part is theta_k = value / sigma, which falls as sigma rises.
             by_sigma = 2 * n - 2 * at.r2 / sigma**2 - theta[k] * by_theta[k]
             return _deviance(n, at, sigma), np.concatenate([[by_sigma], by_theta[others]])
 
@@ -184,13 +187,16 @@ class Profile:
     ) -> float:
         @cache
         def lacking(distance: float) -> float:
+            # At the estimate the rise is zero by definition; a fit there would add its tolerance.
             if not distance:
                 return -self._reach
             rise = deviance(estimate + distance) - self._least
+            # The root of the rise is nearly linear in the distance, so that few fits find its zero.
             return float(np.sqrt(max(rise, 0.0))) - self._reach
 
         near, far = 0.0, self._reach * step
         for _ in range(MAX_DOUBLINGS):
+            # Just above the floor: a residual SD of zero has no logarithm.
             far = max(far, (floor - estimate) * (1 - 1e-6)) if step < 0 else far
             if lacking(far) > 0:
                 root = optimize.brentq(lacking, near, far, xtol=TOLERANCE * abs(far), rtol=1e-12)
@@ -254,6 +260,7 @@ def _minimum(
 
 def _without(c: CrossProducts, column: int | NDArray[np.int64], value: float) -> CrossProducts:
     """The cross-products of the model in which a coefficient, or each of several, has this value."""
+    # A linear change of the columns: the cross-products need no second pass over the trials.
     turn = np.delete(np.eye(c.f + 1), column, axis=1)
     turn[column, -1] = -value
     return replace(c, pb=c.pb @ turn, cb=c.cb @ turn, bb=turn.T @ c.bb @ turn)

@@ -57,6 +57,7 @@ def fit_theta(c: CrossProducts) -> Floats:
 
 
 def _descend(c: CrossProducts, start: Floats, bounded: list[bool], least_fall: float) -> Floats:
+    # The tolerance of L-BFGS-B is relative to the size of the criterion; `least_fall` is not.
     least = max(1e-14, least_fall / max(1.0, abs(criterion(c, start).value)))
 
     def objective(theta: Floats) -> tuple[float, Floats]:
@@ -77,6 +78,7 @@ def _descend(c: CrossProducts, start: Floats, bounded: list[bool], least_fall: f
 def _lifted(c: CrossProducts, theta: Floats, bounded: list[bool]) -> Floats | None:
     """Theta with one entry lifted from zero where that lowers the criterion, else None."""
     at = criterion(c, theta)
+    # The gradient at zero is zero whatever the data are: only the curvature shows a way down.
     for k in np.flatnonzero((np.abs(theta) < ZERO_THETA) & np.array(bounded) & (at.curve_at_zero < 0)):
         trials = np.repeat(theta[None], len(LIFTS), axis=0)
         trials[:, k] = LIFTS
@@ -108,14 +110,17 @@ def _polished(c: CrossProducts, theta: Floats, bounded: list[bool]) -> tuple[Flo
             return theta, True
         hessian = np.stack([_gradient_slope(c, theta, at.gradient, int(k))[free] for k in free])
         values, vectors = np.linalg.eigh((hessian + hessian.T) / 2)
+        # Not a minimum, or level in some direction: a Newton step would lead anywhere.
         if values.min() <= 1e-8 * values.max():
             break
         rotated = vectors.T @ at.gradient[free]
         trial = theta.copy()
         trial[free] -= vectors @ (rotated / values)
+        # Across a bound: the descent, which knows bounds, has to go on from here.
         if (trial[np.array(bounded)] < 0).any():
             break
         after = criterion(c, trial)
+        # Written so that NaN ends the steps too.
         if not after.value < at.value + 1e-10 * abs(at.value):
             break
         theta, at = trial, after
@@ -230,6 +235,7 @@ def components_of_people(
     sds = np.sqrt(np.diag(covariance))
     of_column = [label for label in labels for _ in data.columns(label)]
     sds = sds / [data.unit(label) for label in of_column]
+    # A variance of zero has no correlation: NaN is meant.
     with np.errstate(invalid="ignore", divide="ignore"):
         roots = np.sqrt(np.diag(covariance))
         correlation = covariance / np.outer(roots, roots)

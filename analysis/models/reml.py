@@ -189,6 +189,7 @@ def _flat(values: Floats) -> Floats:
 def summed_product(a: Floats, b: Floats) -> Floats:
     """Sum over levels of a_i b_i', both (N, p, m)."""
     n, p, width = a.shape
+    # One product of wide matrices is faster than a small one for every level.
     turned = (values.transpose(1, 0, 2).reshape(p, n * width) for values in (a, b))
     return np.asarray(next(turned) @ next(turned).T)
 
@@ -278,6 +279,7 @@ class SchurComplement:
         self._k: Floats = np.asarray(cc.toarray() - out.schur(), dtype=np.float64)
         self._kb = kb
         self._lk = self._left(self._k)
+        # K is symmetric: L'(L'K)' is L'K L.
         s = self._left(self._lk.T)
         s[np.diag_indices(len(s))] += 1.0
         # LAPACK refuses matrices without rows
@@ -326,6 +328,7 @@ class SchurComplement:
         scores = self._kb - self._k @ self.solution
         for block, factor in zip(self._blocks, self._factors, strict=True):
             at, p = block.columns, factor.shape[0]
+            # The short way divides by L twice: where a relative SD is small, that would lose the digits.
             if np.linalg.svd(factor, compute_uv=False).min() > WELL_CONDITIONED:
                 # K - K L S^-1 L'K = L^-T (I - S^-1) L^-1
                 lost = block.levels * np.eye(p) - block.diagonal_blocks(self._inverse[at, at])
@@ -441,12 +444,14 @@ def criterion(c: CrossProducts, theta: Floats, reml: bool = True) -> Criterion:
     """Evaluate the criterion and its exact gradient at theta (m,)."""
     f, lp = c.f, c.first.factor(theta)
     gl = c.pp @ lp
+    # I + L'Z'Z L of each level: positive definite at every theta, zero included.
     mp = lp.T @ gl + np.eye(len(lp))
     vb = lp.T @ c.pb
     wb: Floats = np.asarray(np.linalg.solve(mp, vb), dtype=np.float64)
     out = c.crossed.eliminated(lp, mp, gl)
     rest = SchurComplement(c.rest, theta, c.cc, out, c.cb - out.to_rest(wb))
     xp = wb - out.from_rest(rest.solution)
+    # [X y]'V^-1 [X y]: X'V^-1 X, X'V^-1 y and y'V^-1 y in one.
     d = c.bb - vb.reshape(-1, f + 1).T @ wb.reshape(-1, f + 1) - rest.explained
     unscaled = np.asarray(np.linalg.inv(d[:f, :f]), dtype=np.float64)
     beta = unscaled @ d[:f, f]
@@ -462,6 +467,7 @@ def criterion(c: CrossProducts, theta: Floats, reml: bool = True) -> Criterion:
     for block, (trace, score) in zip(c.blocks, each, strict=True):
         factor, residual = block.factor(theta), score[:, :, f] - score[:, :, :f] @ beta
         squares = residual.T @ residual
+        # The restricted likelihood has log|X'V^-1 X|, which changes with theta as well.
         if reml:
             trace = trace - summed_product(score[:, :, :f] @ unscaled, score[:, :, :f])
         grad_h.append(2 * np.tensordot(block.patterns, trace @ factor, 2))

@@ -49,6 +49,7 @@ class _Work:
 
         Work checks before it writes, so a refusal leaves nothing behind that must be undone.
         """
+        # Cleared first: the same work may be tried a second time, alone or by a fresh connection.
         self.result, self.error = None, None
         try:
             self.result = self.do(connection)
@@ -57,6 +58,7 @@ class _Work:
 
     def answer(self) -> None:
         """Hand over the outcome, in the event loop; nobody may be waiting any more."""
+        # The future of a canceled request is done already, and a second result would raise.
         if self.future.done():
             return
         if self.error is not None:
@@ -76,6 +78,7 @@ class _Queue:
 
     def put(self, work: _Work) -> None:
         with self._changed:
+            # Two queues: a rating overtakes the run starts that came before it.
             (self._heavy if work.weight > 1 else self._light).append(work)
             self._changed.notify()
 
@@ -88,11 +91,13 @@ class _Queue:
     def take(self, rest: Callable[[], None]) -> list[_Work]:
         """What shares the next commit, light work first; empty at the end. Waits; rests if that is long."""
         with self._changed:
+            # Two waits: after the first the connection is given back, and the second holds nothing.
             if not self._changed.wait_for(self._has_news, KEPT_S):
                 rest()
                 self._changed.wait_for(self._has_news)
             batch = [self._light.popleft() for _ in range(min(MAX_LIGHT, len(self._light)))]
             weight = 0
+            # The first piece goes in whatever it weighs: one above MAX_HEAVY would otherwise wait for ever.
             while self._heavy and (weight == 0 or weight + self._heavy[0].weight <= MAX_HEAVY):
                 weight += self._heavy[0].weight
                 batch.append(self._heavy.popleft())
@@ -130,6 +135,7 @@ class GroupCommit:
 
     def close(self) -> None:
         """Finish what waits, then stop."""
+        # All queues end before any thread is joined: the writers finish at the same time and not in turn.
         for queue in self._queues:
             queue.end()
         for thread in self._threads:
@@ -138,13 +144,16 @@ class GroupCommit:
 
     def _start(self) -> list[_Queue]:
         with self._starting:
+            # Checked again under the lock: two threads that come at once would each start their writers.
             if not self._queues:
                 number = 1 if self.database.is_sqlite else POSTGRES_WRITERS + 1
                 queues = [_Queue() for _ in range(number)]
                 for queue in queues:
+                    # A daemon, so that a process whose `close` is never called still ends.
                     thread = threading.Thread(target=self._write, args=(queue,), name="writer", daemon=True)
                     thread.start()
                     self._threads.append(thread)
+                # Set last: `run` takes a list that is not empty as the sign that every writer has a thread.
                 self._queues = queues
             return self._queues
 
@@ -170,6 +179,7 @@ def _commit(writer: Writer, batch: list[_Work]) -> None:
             # It may have been cut long ago. All work can be done again: what is stored is stored once.
             _commit(writer, batch)
             return
+        # A busy database refuses every piece alike: one by one they would wait in vain as many times.
         if len(batch) == 1 or is_busy(error):
             for work in batch:
                 work.error = error
@@ -184,6 +194,7 @@ def _resolve_batch(loop: asyncio.AbstractEventLoop, batch: list[_Work]) -> None:
         for work in batch:
             work.answer()
 
+    # At shutdown a loop may be closed before the last commit, and the call would raise.
     if not loop.is_closed():
         loop.call_soon_threadsafe(answer_all)
 
@@ -287,6 +298,7 @@ class Prepared:
     def _cursor(self, connection: Connection, values: Mapping[str, Any]) -> Any:
         """The driver's cursor on the rows that there are."""
         dialect = connection.dialect
+        # Two threads may compile it at once: their results are equal, so that no lock is needed.
         if dialect.name not in self._compiled:
             self._compiled[dialect.name] = _compile_statement(self._statement, dialect, self._columns)
         compiled = self._compiled[dialect.name]
@@ -294,6 +306,7 @@ class Prepared:
         # begin.
         if not connection.in_transaction():
             connection.begin()
+        # Before the cursor: a value that is missing must not leave one open.
         given = compiled.values(values)
         try:
             cursor = connection.connection.cursor()
@@ -316,6 +329,7 @@ class Query(Prepared, Generic[Row]):
         """Every row; raises as `run`."""
         dialect = connection.dialect
         cursor = self._cursor(connection, values)
+        # Only a result names the driver's type codes, so that these cannot be made with the statement.
         if dialect.name not in self._processors:
             self._processors[dialect.name] = _result_processors(self._types, dialect, cursor.description)
         rows, processors = cursor.fetchall(), self._processors[dialect.name]

@@ -19,9 +19,11 @@ def comparable_answer(payload: Mapping[str, Any]) -> int | str | None:
     said = {name: _without_time(value) for name, value in payload.items() if value is not None}
     if said.keys() == {"response"}:
         return said["response"] if isinstance(said["response"], int) else str(said["response"])
+    # Scales that were all left empty are nothing answered, though the payload itself is not empty.
     scales = payload.get("answers", {}).values()
     if scales and all(one["response"] is None and not one.get("not_applicable") for one in scales):
         return None
+    # Sorted: equal answers must give equal texts, whatever the order of their keys.
     return json.dumps(said, sort_keys=True) if said else None
 
 
@@ -219,6 +221,7 @@ def signals_of(
 
 def _guessed_together(checks: Sequence[JudgedAnswer], wrong: Sequence[int]) -> float | None:
     weighed = [one for one in checks if one.choices > 1]
+    # A check with one choice cannot be answered wrongly, and says nothing of guessing.
     choices = [*(one.choices for one in weighed), *(number for number in wrong if number > 1)]
     if not choices:
         return None

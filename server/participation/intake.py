@@ -366,6 +366,7 @@ def _seen_before(connection: Connection, answer: Answer, issued_at: datetime, be
 def _is_late(answer: Answer, last_received_at: datetime | None) -> bool:
     """True where it came sooner after the one before than its clip lasts, or long after it was given."""
     delay = answer.received_at - answer.answered_at if answer.answered_at else timedelta()
+    # Before the first answer nothing came: its gap counts as long enough.
     gap_ms = milliseconds(answer.received_at - last_received_at) if last_received_at else answer.clip_ms
     # Either sign: a client's clock that is ahead by a minute says as little about the delivery as one that
     # is behind.

@@ -146,8 +146,10 @@ def _judge_run_later(database: Database, clips: ClipHashes, run_id: int, away: s
     judged = _judge_digests(clips, waiting, time.monotonic() + LATER_LIMIT_S, away)
     if judged:
         with database.write() as session:
+            # Locked before the digests are stored: the run's end must not give its verdict between the two.
             run = evidence_repository.lock_run(session, run_id)
             stored = _store_judged(session.connection(), judged)
+            # A run that is open gets its verdict at its end, and of an erased one nothing is left to judge.
             if stored and run.evidence_verdict is not None and run.erased_at is None:
                 _judge_again(session, run, stored)
     return _answers(waiting) - len(judged)
@@ -230,7 +232,9 @@ async def _watch(database: Database, intake: Intake, look_every_s: float, stoppe
         await asyncio.sleep(wait_s)
         if not intake.unchecked.is_set() and not left:
             continue
+        # Nothing new since the last look: what is left waits for a store that is away, so look ever less.
         wait_s = look_every_s if intake.unchecked.is_set() else min(2 * wait_s, MAX_WAIT_S)
+        # Cleared before the look and not after it: an answer that comes meanwhile must cause another one.
         intake.unchecked.clear()
         try:
             before, left = left, await asyncio.to_thread(judge_later, database, intake.clips, stopped)
@@ -238,5 +242,6 @@ async def _watch(database: Database, intake: Intake, look_every_s: float, stoppe
             LOG.exception("digests of clips")
             intake.unchecked.set()
             continue
+        # Some could be judged: the store answers again.
         if left < before:
             wait_s = look_every_s

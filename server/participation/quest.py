@@ -123,6 +123,7 @@ def _state_after(model: Model, answers: Answers) -> _State:
     while begin and (model, answers[:begin]) not in _states:
         begin -= 1
     state = _states.get((model, answers[:begin])) or _store_state(model, (), None)
+    # What was used last goes last, and is forgotten last.
     _states.move_to_end((model, answers[:begin]))
     for end in range(begin + 1, len(answers) + 1):
         state = _store_state(model, answers[:end], state)
@@ -144,6 +145,7 @@ def _store_state(model: Model, answers: Answers, before: _State | None) -> _Stat
 def _next_state(model: Model, answers: Answers, before: _State | None) -> _State:
     engine = _engine(model)
     if before is None:
+        # The library's object is shared by all participants of a study: its posterior is set before each use.
         engine.posterior = engine.prior
     else:
         (stimulus, positive), engine.posterior = answers[-1], before.posterior
@@ -167,6 +169,7 @@ def _estimate(model: Model, engine: "QuestPlus") -> Estimate:
     shares = engine.marginal_posterior[threshold].tolist()
     variance = math.fsum(p * (v - means[threshold]) ** 2 for p, v in zip(shares, values, strict=True))
     every = engine.posterior.values.ravel().tolist()
+    # p log p is 0 at p = 0, where the logarithm is not finite.
     entropy = -math.fsum(p * math.log2(p) for p in every if p > 0)
     sign = -1 if model.falling else 1
     return Estimate(sign * means[threshold], math.sqrt(variance), means[spread], max(0.0, entropy))
@@ -188,6 +191,7 @@ def _engine(model: Model) -> "QuestPlus":
 
     if model.seconds:
         return _plane_engine(model)
+    # The library's functions rise: where the declared one falls, the sign of the stimulus is turned.
     sign = -1 if model.falling else 1
     threshold, spread = _names(model)
     return QuestPlus(

@@ -88,6 +88,7 @@ def delivery_of(
             f"Trial {rating.trial_index} is not in this run, which has trials 0 to {run.trials_total - 1}."
         )
     loaded = versions.get(connection, run.version_id)
+    # The clip may have been chosen again since: what counts is the one that the page has shown.
     if KINDS[loaded.experiment.trial.kind].adapts:
         trial = series.as_offered(connection, run.id, trial, rating)
     stored = rating_repository.stored_ratings(connection, run.id, rating.trial_index, rating_id)
@@ -98,6 +99,7 @@ def row_of(delivery: SubmittedRating, ruling: Ruling) -> dict[str, Any]:
     """The rating's row."""
     rating, run = delivery.rating, delivery.run
     playback = dict(rating.playback)
+    # Of several clips, in a column of JSON; every other key of the log has its own column.
     clips: ShownClips | None = playback.pop("clips")
     return {
         "rating_id": delivery.rating_id,
@@ -129,6 +131,7 @@ def play_of(delivery: SubmittedRating, ruling: Ruling) -> Play:
     is_main = trial.kind == "main"
     counted: Iterable[TallyEntry] = ()
     if is_main:
+        # Numbers within the version instead of ids: a tally packs them into 18 bits.
         places = {role: loaded.numbered[clip] for role, clip in trial.clips.items()}
         counted = served_kind(loaded.experiment.trial.kind).counted(places, delivery.payload)
     playback = rating.playback
@@ -174,6 +177,7 @@ def answer_to(
     """An answer to a trial as the evidence sees it; `which` is the trial's index and the play."""
     clips = [loaded.clips[ident] for ident in trial.clips.values()]
     lengths = {role: loaded.lengths[loaded.clips[ident].sha256] for role, ident in trial.clips.items()}
+    # A motion check shows its one clip whatever the study's kind: the kind's own timing is not for it.
     shown_ms = max(lengths.values(), default=0.0) if is_check else loaded.experiment.trial.shown_ms(lengths)
     # A motion check that was passed over was not begun.
     tried_ms = 0.0 if is_check else min(shown_ms, TRIED_MS)
@@ -302,6 +306,7 @@ def _receipt_of_known(
         verdict=known.verdict,
         rule=known.verdict_rule,
         again=not delivery.settles(known.play, known.verdict),
+        # From the run as it is now: other answers may have been stored since the first receipt.
         remaining=run.trials_total - run.trials_answered,
         status=run.status,
         warning=warnings.warning_of(connection, run.id, delivery.experiment, known.rating_id),
@@ -336,6 +341,7 @@ def _receipt_of_new(connection: Connection, delivery: SubmittedRating, ruling: R
     if delivery.adapts and series.take_answer(
         connection, run.id, delivery.loaded, delivery.trial, rating, ruling
     ):
+        # The end of its series has counted this trial already (`close_trials`).
         before = True
     # A second play of a settled trial is stored, but the trial is answered once.
     answered = int(settles and not before)

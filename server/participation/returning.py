@@ -89,6 +89,7 @@ def _code_text(number: int, signs: int) -> str:
 
 
 def _signs(typed: str) -> str:
+    # Typed by hand: case, blanks and hyphens do not matter, nor do letters that look like digits.
     return "".join(typed.upper().replace("-", " ").split()).translate(_READ_AS)
 
 
@@ -162,10 +163,12 @@ def _run_of_id(
     start: RunStart,
 ) -> StudyRun | None:
     """The run of the recruiter's id where the address is signed that it began by; otherwise none."""
+    # A personal link is the person: an id in its address must not lead to somebody else's visit.
     if link.kind == "personal":
         return None
     signed = is_signed(settings.key, link.study.pseudonym_key, recruiter, start.query)
     if recruiter.kind == "generic" and not signed:
+        # Anybody can put any id into such an address: unsigned, it neither opens nor refuses a visit.
         return None
     identifier = settled_id(session, link, recruiter, start.query)
     name = name_of(link, link.study, identifier)
@@ -191,6 +194,7 @@ def count_code(resume_codes: RateLimit, link_token: str, typed: str) -> None:
 def _run_of_code(settings: Settings, session: Session, link: Link, typed: str) -> StudyRun:
     prefix = run_prefix(typed)
     runs = run_repository.runs_beginning(session, link, prefix) if prefix else ()
+    # The prefix may fit several visits: only the secret part decides which one is meant.
     run = next((run for run in runs if code_fits(settings.key, run.public_id, typed)), None)
     if run is None:
         raise ResumeCodeWrong("This link has no visit with this resume code. Please check the code.")

@@ -100,7 +100,9 @@ def run_by_token(session: Session, token: str, *, lock: bool = False) -> StudyRu
 
 def lock_study(session: Session, study_id: int) -> Study:
     """The study, held until the transaction ends: one start or completion of it at a time."""
+    # FOR NO KEY UPDATE: rows that refer to the study may still be inserted meanwhile.
     query = select(Study).where(Study.id == study_id).with_for_update(key_share=True)
+    # A study that this session had read before would keep the status and quota of that moment.
     return session.scalars(query.execution_options(populate_existing=True)).one()
 
 
@@ -198,6 +200,7 @@ def trials(session: Session, run: StudyRun) -> list[StoredTrial]:
     rows = session.connection().execute(_TRIALS, {"run": run.id})
     stored: list[StoredTrial] = []
     for trial_index, kind, block, expected, role, clip in rows:
+        # One row per clip: a trial of several clips comes several times, one without clips once, with nulls.
         if not stored or stored[-1].trial_index != trial_index:
             stored.append(StoredTrial(trial_index, kind, block, expected, {}))
         if role is not None:
@@ -330,6 +333,7 @@ def _slots_held(version: Any, origin: Any, seen_after: Any) -> Select[int]:
 
 def _free_slot_statement() -> Any:
     taken = _slots_held(bindparam("version"), bindparam("origin"), bindparam("seen_after")).cte("taken")
+    # The smallest free slot is 0 or follows a held one: no other number has to be looked at.
     candidates = union_all(select(literal(0).label("slot")), select(taken.c.slot + 1)).subquery()
     return select(func.min(candidates.c.slot)).where(candidates.c.slot.not_in(select(taken.c.slot)))
 
@@ -345,6 +349,7 @@ def free_slot_of(
     taken = (
         _slots_held(version_id, origin, now() - lease).where((StudyRun.slot % groups).in_(turns)).cte("taken")
     )
+    # The first slot of each group, or the next one of a group after a slot that is held.
     firsts = [select(literal(turn).label("slot")) for turn in turns]
     candidates = union_all(*firsts, select(taken.c.slot + groups)).subquery()
     free = select(func.min(candidates.c.slot)).where(candidates.c.slot.not_in(select(taken.c.slot)))
@@ -371,6 +376,7 @@ def compared_answers(session: Session, version_id: int, origin: str, lease: time
         .join(AssignedTrial, AssignedTrial.study_run_id == StudyRun.id)
         .join(first, _of_trial(first, 0))
         .join(second, _of_trial(second, 1))
+        # Outer: a pair that was dealt and not answered yet is in the design already, without a winner.
         .outerjoin(
             Rating,
             and_(

@@ -111,6 +111,7 @@ def outlook_after(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequenc
         said: Answers = tuple((shown[row.version_clip_id], row.positive) for row in given)
         known[one.name] = len(given)
         for number, row in enumerate(given, start=1):
+            # An estimate that is stored stays: only answers since the last time lack one.
             if row.threshold is None:
                 estimates[row.trial_index, row.play] = quest.estimate(assumed, said[:number])
         mine = [row for row in trials if row.series == one.name]
@@ -180,6 +181,7 @@ def _store_outlook(connection: Connection, token: str, outlook: Outlook) -> Outl
 
 
 def _is_new(offer: Offer, latest: Mapping[int, int]) -> bool:
+    # A choice that rests on no more answers than the stored one would be a step back.
     return offer.known > latest.get(offer.trial_index, -1)
 
 

@@ -230,6 +230,7 @@ class Tally:
         if answer.cell is None:
             return
         sums = self.cells.setdefault(answer.scale, [])
+        # Grown to the cell's place: cells before it without an answer hold zeros.
         sums.extend([0] * (2 * answer.cell + 2 - len(sums)))
         sums[2 * answer.cell] += 1
         sums[2 * answer.cell + 1] += answer.units

@@ -114,6 +114,7 @@ def _summed_counts(counts: Iterable[dict[str, int]]) -> dict[str, int]:
 
 def means_by_cell(sums: Sequence[int], levels: Sequence[tuple[str, ...]]) -> dict[tuple[str, ...], float]:
     """Levels -> mean answer, of cells that have one; `sums` as `Tally.cells` has them."""
+    # A stored tally ends with the last cell that has an answer: the cells after it have no mean.
     cells = zip(levels, sums[::2], sums[1::2], strict=False)
     return {key: total / (UNIT * number) for key, number, total in cells if number}
 
@@ -203,10 +204,12 @@ class Recount:
 def repair(database: Database, versions: Versions) -> tuple[int, int]:
     """Fix every tally that differs, one run per transaction; return how many were fixed, of how many."""
     compared = Recount(versions)
+    # One snapshot: read at two moments, every rating stored between them would look like a fault.
     with database.snapshot() as session:
         wrong = list(compared.differing(session))
     for run in wrong:
         with database.write() as session:
             tally_repository.lock_run(session, run)
+            # Counted again under the lock: ratings may have come since the comparison.
             tally_repository.replace_tally(session, run, compared.counted(session, [run]).get(run))
     return len(wrong), compared.runs

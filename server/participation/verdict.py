@@ -103,6 +103,7 @@ def judge(
 
 
 def _failing_rule(rules: PlaybackRules, playback: Playback) -> str:
+    # What was not measured fails nothing here: a missing log is flagged by a rule of its kind below.
     if (playback.frames_missing or 0) > rules.failed_missing_frames:
         return "failed_missing_frames"
     if (playback.longest_gap_ms or 0) > rules.failed_longest_gap_ms:
@@ -129,6 +130,7 @@ def _flagging_rule(rules: PlaybackRules, playback: Playback, frames: int) -> str
         return "flagged_longest_gap_ms"
     if playback.disturbances.get(IMPOSSIBLE):
         return IMPOSSIBLE
+    # The element's log is not compared: its callbacks miss frames that were shown.
     if playback.method == "video":
         return "video_fallback" if rules.flag_video_fallback else ""
     if playback.frames_missing is None or playback.frames_seen is None:

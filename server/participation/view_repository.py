@@ -117,6 +117,7 @@ def stored_views(connection: Connection, run: int, trial: int) -> list[StoredVie
     rows = _OF_TRIAL.all(connection, {"run": run, "trial": trial})
     if not rows:
         return None
+    # The outer join gives a trial without views one row of nulls.
     return [row for row in rows if row.view_id is not None]
 
 

@@ -58,6 +58,7 @@ def pack_log(log: Iterable[Entry]) -> str:
 def unpack_log(text: str) -> list[Entry]:
     """The log that `pack_log` made a text of."""
     numbers, entries, frame, time = _numbers(base64.b64decode(text)), [], 0, 0
+    # Two numbers per entry: the step of the frame, then that of its time.
     for step in numbers:
         frame, time = frame + step, time + next(numbers)
         entries.append((frame, time / PER_MS))

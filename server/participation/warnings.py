@@ -101,6 +101,7 @@ def waiting_warning(connection: Connection, run: int, experiment: Experiment) ->
         return None
     events = rating_repository.events_of(connection, run, (WARNED, SHOWN))
     warned = [event.data for event in events if event.type == WARNED]
+    # The other events are warnings that were shown: as many as were given means that none waits.
     if len(warned) <= len(events) - len(warned):
         return None
     return _as_told(connection, run, experiment, warned[-1])
@@ -162,4 +163,5 @@ def in_language(text: Translated, language: str, languages: Sequence[str]) -> st
 
 
 def _event_id(rating_id: str) -> str:
+    # From the rating's id: the same answer sent again warns once, and finds its own warning.
     return f"{WARNED} {rating_id.replace('-', '')}"

@@ -84,6 +84,7 @@ const OF_THE_VISIT = ["run_unknown", "run_closed", "consent_missing", "rating_di
 /** The report of a record that the server, or something on the way, will never accept; null if there is nothing to report. */
 function reportOf(item: OutboxItem, { status, code, message }: Refused): OutboxItem | null {
   const isRecord = item.path.startsWith("/api/run/ratings/") || item.path === "/api/run/views";
+  // Where the token is refused (401), a report under the same token would be refused as well.
   if (!isRecord || status < 400 || status === 401 || OF_THE_VISIT.includes(code)) return null;
   const reason = { code: code.slice(0, 100), message: message.slice(0, 2000) };
   return { ...item, method: "POST", path: REFUSED, body: { id: item.id, path: item.path, status, ...reason, body: item.body } };
@@ -130,6 +131,7 @@ export class Outbox {
 
   /** Keep one write; resolves when it is on disk. `id` is made here unless the path already carries one. */
   async put(method: "PUT" | "POST", path: string, body: unknown, id: string = crypto.randomUUID()): Promise<Sent> {
+    // Before it is kept: the server's answer may come as soon as the item is queued.
     const receipt = new Promise<Outcome>((resolve) => this.waiting.set(id, resolve));
     await this.keep({ id, kind: "write", method, path, body });
     return { id, receipt };
@@ -182,6 +184,7 @@ export class Outbox {
     // One request at a time: the server then gets answers in the order in which they were given.
     if (this.running || this.stopped) return;
     this.running = true;
+    // Looked up again each time: an answer put meanwhile goes before the events that wait.
     for (let batch = this.next(); batch; batch = this.next()) {
       const wait_ms = await this.sendOne(batch);
       this.changed();
@@ -230,6 +233,7 @@ export class Outbox {
     // Under the id of the record, whose place the report takes: a page that dies in between loses neither.
     else if (reports.length > 0) for (const report of reports) await this.onDisk(() => this.store.add(report));
     else for (const item of batch.items) await this.onDisk(() => this.store.refuse(item, outcome.refused.code));
+    // A report takes its record's place in the order of sending.
     this.queue = [...this.queue.filter((item) => !ids.has(item.id)), ...reports].sort((a, b) => a.sequence - b.sequence);
     for (const id of ids) {
       this.waiting.get(id)?.(outcome);
@@ -241,6 +245,7 @@ export class Outbox {
   private async pause(ms: number): Promise<void> {
     const woken = new Promise<void>((resolve) => (this.wake = resolve));
     const sleep = this.options.pause ?? ((time) => new Promise<void>((resolve) => setTimeout(resolve, time)));
+    // Whichever comes first: `nudge` and `stop` end the wait early.
     await Promise.race([sleep(ms), woken]);
   }
 

@@ -115,6 +115,7 @@ export class StreamedClip {
       if (chunk) decoder.decode(chunk);
     }
     // The last frames come out only when the decoder knows that they are the last.
+    // A rewind closes the decoder, which rejects a flush that is not done yet: nothing is wrong then.
     if (this.fed === this.chunks.length) decoder.flush().catch(() => {});
   }
 
@@ -125,11 +126,13 @@ export class StreamedClip {
     try {
       if (decoder !== this.decoder || index < this.shown) return;
       const bitmap = await createImageBitmap(frame);
+      // Asked again: the clip may have been rewound while the picture was made.
       if (decoder !== this.decoder || index < this.shown) {
         bitmap.close();
         return;
       }
       this.ring.set(index, bitmap);
+      // A clip of fewer frames than AT_START would never begin otherwise.
       if (this.ring.size >= Math.min(AT_START, this.frames)) this.start?.resolve();
     } catch (error) {
       this.fail(error instanceof Error ? error : new Error(String(error)));

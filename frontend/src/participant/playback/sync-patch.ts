@@ -18,6 +18,7 @@ const PARTS = 12;
 /** White fields, row by row: the middle one for odd frames, the others a Gray code, lowest bit first; all for none. */
 export function patchFields(index: number | null): boolean[] {
   const number = (index ?? 0) % NUMBERS;
+  // A Gray code: neighbors differ in one field, so that a film of two frames mixed is off by one at most.
   const code = number ^ (number >> 1);
   return Array.from({ length: SIDE * SIDE }, (_, field) => {
     if (index === null) return true;

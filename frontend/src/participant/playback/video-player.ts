@@ -21,6 +21,7 @@ export class VideoPlayer implements ClipPlayer {
   private readonly loaded = new Map<string, Loaded>();
 
   constructor() {
+    // Only a muted video may start by itself, and iPhones show one that is not inline in full screen.
     Object.assign(this.video, { muted: true, playsInline: true, preload: "auto", disablePictureInPicture: true });
     this.video.style.visibility = "hidden";
     this.element.append(this.video);
@@ -51,6 +52,7 @@ export class VideoPlayer implements ClipPlayer {
     if (!clip) throw new ClipBroken("expected a prepared clip");
     if (this.video.src !== clip.address) await ready(this.video, clip.address);
     await new Promise((resolve) => setTimeout(resolve, fixation_ms));
+    // The view must be kept before its first frame is uncovered.
     await kept;
     await rewound(this.video);
     const first_at_ms = await uncovered(this.video);
@@ -75,6 +77,7 @@ export class VideoPlayer implements ClipPlayer {
 
   release(sha256: string): void {
     const clip = this.loaded.get(sha256);
+    // The browser holds the bytes until their address is revoked.
     if (clip) URL.revokeObjectURL(clip.address);
     this.loaded.delete(sha256);
   }

@@ -25,6 +25,7 @@ const DROPPED = 1.4;
 /** Share of a box inside a window of this size, 0 to 1. */
 export function visibleShare({ left, top, right, bottom }: Box, width: number, height: number): number {
   const area = (right - left) * (bottom - top);
+  // An element without a size is not laid out: nothing of it can be cut off.
   if (area <= 0) return 1;
   const across = Math.max(0, Math.min(right, width) - Math.max(left, 0));
   const down = Math.max(0, Math.min(bottom, height) - Math.max(top, 0));
@@ -61,6 +62,7 @@ export function watchDisturbances(clip: HTMLElement, before: Layout): { stop: ()
   const add = (name: string): void => void (counts[name] = (counts[name] ?? 0) + 1);
   const look = (): void => {
     const box = clip.getBoundingClientRect();
+    // Rounded down: a box may have a fraction of a pixel more than the window, whose sides are whole.
     const is_small = window.innerWidth < Math.floor(box.width) || window.innerHeight < Math.floor(box.height);
     if (is_small && !small) add("window_too_small");
     small = is_small;
