@@ -473,6 +473,25 @@ def SkelRoot "{node}"
 """
 
 
+# Programs that animate a photograph: how open each eye is, frame by frame.
+
+OPEN_EYE = 0.3
+"""Distance of the lids over the width of an eye that looks ahead; each photograph has its own."""
+LIVEPORTRAIT_HEIGHTS, DITTO_HEIGHTS = 1, 3
+"""LivePortrait measures the lids' distance once, Ditto adds that of three places (its `EyeAttrUtilsByMP`)."""
+
+
+def to_eye_ratios(curve: AnimationCurve, heights: int) -> str:
+    """Lines of two numbers, lids' distance over the eye's width, for `numpy.loadtxt(file, delimiter=",")`.
+
+    The first number is of the eye on the left of the picture, which is the person's right eye.
+    """
+    shut = np.column_stack([curve.right, curve.left])
+    ratios = heights * OPEN_EYE * (1.0 - shut)
+    lines = [f"# {curve.fps:g} fps; eye on the picture's left, on its right"]
+    return "\n".join([*lines, *(f"{left:.4f},{right:.4f}" for left, right in ratios.tolist()), ""])
+
+
 # Every format a curve can be written in, and the names it writes the eyes under.
 
 _SAFE_NAME = re.compile(r"[A-Za-z_][\w.:|-]*")
@@ -495,6 +514,8 @@ FORMATS: Mapping[str, Callable[[AnimationCurve, CurveTarget], str]] = {
     "arkit": lambda curve, _: to_arkit(curve),
     "gltf": lambda curve, target: to_gltf(curve, target.name or "face", target.left, target.right),
     "usd": lambda curve, target: to_usd(curve, target.name or "face", target.left, target.right),
+    "liveportrait": lambda curve, _: to_eye_ratios(curve, LIVEPORTRAIT_HEIGHTS),
+    "ditto": lambda curve, _: to_eye_ratios(curve, DITTO_HEIGHTS),
 }
 
 

@@ -18,7 +18,8 @@ def performance(
     ] = None,
     out: Annotated[Path, typer.Option(help="File to write.")] = Path("performance.csv"),
     format_name: Annotated[
-        str, typer.Option("--format", help="csv, json, blender, maya, arkit, gltf or usd.")
+        str,
+        typer.Option("--format", help="csv, json, blender, maya, arkit, gltf, usd, liveportrait, ditto."),
     ] = "csv",
     fps: Annotated[float, typer.Option(help="Frame rate of the curves.")] = 60.0,
     seed: Annotated[
@@ -40,6 +41,17 @@ def performance(
     rate: Annotated[
         float | None, typer.Option(help="Blinks per minute in --state. Default: the published mean.")
     ] = None,
+    blinks_at: Annotated[
+        Path | None,
+        typer.Option(help="CSV of the times (time_s) at which blinks begin: no others come."),
+    ] = None,
+    complete: Annotated[
+        float | None,
+        typer.Option(help="Share of blinks that close the eye completely. Default: 0.286."),
+    ] = None,
+    lively: Annotated[
+        float | None, typer.Option(help="From 0 (calm: half as many blinks) to 1 (lively: twice as many).")
+    ] = None,
     target: Annotated[str, typer.Option(help="Object (Blender) or node (Maya) with the shapes.")] = "",
     left: Annotated[str, typer.Option(help="Name of the left eye's shape or attribute.")] = "eyeBlinkLeft",
     right: Annotated[str, typer.Option(help="Name of the right eye's shape or attribute.")] = "eyeBlinkRight",
@@ -53,6 +65,10 @@ def performance(
       stimuli performance dialogue.vtt --speaker Anna --out anna.csv --format arkit
 
       stimuli performance --duration 60 --state reading --out reading.json --format json
+
+      stimuli performance --duration 20 --blinks-at onsets.csv --complete 1 --out given.csv
+
+      stimuli performance speech.wav --lively 0.8 --fps 25 --format liveportrait --out eyes.csv
     """
     from stimuli_builder.blinks.export import CurveTarget
     from stimuli_builder.performance.run import PerformanceJob, write_performance
@@ -68,6 +84,9 @@ def performance(
             duration,
             speaker,
             rate,
+            blinks_at,
+            complete,
+            lively,
             CurveTarget(target, left, right),
         )
     )

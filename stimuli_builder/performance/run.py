@@ -10,11 +10,14 @@ import webvtt
 from rich.console import Console
 from webvtt.models import Caption
 
-from blink_engine import Performance, StateName, default_parameters, perform
+from blink_engine import Event, Performance, StateName, default_parameters, perform
+from blink_engine.laws import Law
+from blink_engine.parameters import Parameters
 from blink_engine.speech import Speech, join_speech, seed_of_speaker, speech_events, speech_states
 from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import check_targets, whole_text
 from stimuli_builder.blinks.export import AnimationCurve, CurveTarget, check_format, write_curve
+from table_files.open import named_rows
 
 # Where somebody speaks by the times of subtitles (WebVTT, SubRip).
 
@@ -84,6 +87,7 @@ def _seconds(stamp: str) -> float:
 
 MAX_FRAMES = 6_000_000
 """A day at 60 frames a second; more is a slip of the keyboard, and would fill the memory."""
+MAX_SECONDS = 86_400
 LOWER_UP_MM, LOWER_IN_MM = 0.75, 2.6
 """The lower lid's full travel: the middle of the ranges of `stimuli_builder.blinks.export`."""
 
@@ -101,6 +105,9 @@ class PerformanceJob:
     duration_s: float | None = None
     speaker: str | None = None
     rate: float | None = None
+    blinks_at: Path | None = None
+    complete: float | None = None
+    lively: float | None = None
     target: CurveTarget = field(default_factory=CurveTarget)
 
 
@@ -115,15 +122,14 @@ def write_performance(job: PerformanceJob) -> None:
         raise InputError(
             f"expected at most {MAX_FRAMES} frames, got {duration_s * job.fps:.0f}; lower --duration or --fps"
         )
-    parameters = default_parameters()
-    if job.rate is not None:
-        parameters = parameters.with_rate(state, job.rate)
+    onsets = [] if job.blinks_at is None else _onsets(job.blinks_at, duration_s)
+    parameters = _parameters(job, state)
     done = perform(
         duration_s,
         job.fps,
         seed=job.seed if job.speaker is None else seed_of_speaker(job.seed, job.speaker),
         state=state,
-        events=speech_events(stretches),
+        events=[Event("blink", one) for one in onsets] if onsets else speech_events(stretches),
         changes=speech_states(stretches, state) if stretches else (),
         parameters=parameters,
         ends_open=True,
@@ -141,6 +147,43 @@ def write_performance(job: PerformanceJob) -> None:
         Console(stderr=True, markup=False).print(
             f"{job.source}: there is no speech; the blinks are those of '{job.state}'"
         )
+
+
+def _parameters(job: PerformanceJob, state: StateName) -> Parameters:
+    """The engine's parameters with what the job changes."""
+    parameters = default_parameters()
+    if job.rate is not None:
+        parameters = parameters.with_rate(state, job.rate)
+    if job.lively is not None:
+        # Half to twice the published rate in every state: most people's means lie between.
+        laws = {
+            one: law.with_mean(law.mean * 2 ** (1 - 2 * job.lively))
+            for one, law in parameters.intervals.items()
+        }
+        parameters = parameters.with_intervals(laws)
+    if job.complete is not None:
+        parameters = parameters.with_profile(complete_share=job.complete, long_share=0.0)
+    if job.blinks_at is not None:
+        never = Law("fixed", 10 * MAX_SECONDS)
+        parameters = parameters.with_intervals(dict.fromkeys(parameters.intervals, never))
+        parameters = parameters.with_profile(double_share=0.0)
+    return parameters
+
+
+def _onsets(path: Path, duration_s: float) -> list[float]:
+    """Times in s at which a file says that blinks begin: its column `time_s` or `onset_s`."""
+    table = named_rows(path)
+    name = next((one for one in ("time_s", "onset_s") if one in table.header), None)
+    if name is None:
+        raise InputError(f"{path}: expected a column time_s or onset_s, got {', '.join(table.header)}")
+    texts = [row[name] for _, row in table.rows if row[name].strip()]
+    try:
+        onsets = sorted(float(text) for text in texts)
+    except ValueError as error:
+        raise InputError(f"{path}: {name}: expected seconds: {error}") from error
+    if not onsets or not 0 <= onsets[0] <= onsets[-1] <= duration_s:
+        raise InputError(f"{path}: expected times from 0 to {duration_s:g} s; fix them or --duration")
+    return onsets
 
 
 def animation_curve(done: Performance) -> AnimationCurve:
@@ -161,8 +204,13 @@ def _checked(job: PerformanceJob) -> StateName:
         raise InputError(f"expected --fps from 1 to 1000, got {job.fps:g}")
     if job.rate is not None and not 0.1 <= job.rate <= 60:
         raise InputError(f"expected --rate from 0.1 to 60 blinks a minute, got {job.rate:g}")
-    if job.duration_s is not None and not 0 < job.duration_s <= 86_400:
-        raise InputError(f"expected --duration from 0 to 86400 seconds, got {job.duration_s:g}")
+    if job.duration_s is not None and not 0 < job.duration_s <= MAX_SECONDS:
+        raise InputError(f"expected --duration from 0 to {MAX_SECONDS} seconds, got {job.duration_s:g}")
+    for option, share in (("--complete", job.complete), ("--lively", job.lively)):
+        if share is not None and not 0 <= share <= 1:
+            raise InputError(f"expected {option} from 0 to 1, got {share:g}")
+    if job.blinks_at is not None and (job.rate is not None or job.lively is not None):
+        raise InputError("--blinks-at gives every blink; remove --rate and --lively")
     if job.state not in get_args(StateName):
         states = list(get_args(StateName))
         raise InputError(f"unknown --state '{job.state}'{did_you_mean(job.state, states)}")

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from blink_engine.speech import Speech, join_speech, speech_events, speech_states
 from experiments.declaration.rendering import RenderSettings
 from experiments.errors import InputError
+from stimuli_builder.blinks.export import AnimationCurve, CurveTarget, write_curve
 from stimuli_builder.cli import app
 from stimuli_builder.clips.design_clips import performance_curve
 from stimuli_builder.performance.audio import speech_in_audio
@@ -218,3 +219,67 @@ def test_a_file_without_sound_is_refused(tmp_path: Path) -> None:
     table.touch()
     with pytest.raises(InputError, match=r"or subtitles \(\.vtt, \.srt\): [^\[]+$"):
         speech_in_audio(table)
+
+
+def _blinks(folder: Path, *arguments: str) -> dict[str, list[float]]:
+    out = folder / "out.json"
+    done = CliRunner().invoke(app, ["performance", "--out", str(out), "--format", "json", *arguments])
+    assert done.exit_code == 0, done.output
+    curves: dict[str, list[float]] = json.loads(out.read_text(encoding="utf-8"))
+    return curves
+
+
+def _onsets_in(closure: list[float], fps: float) -> np.ndarray:
+    """Times at which the eye begins to close, from the curve alone."""
+    moved = np.asarray(closure) > min(closure) + 1e-6
+    return np.flatnonzero(moved[1:] & ~moved[:-1]) / fps
+
+
+def test_given_blinks_come_when_they_are_given_and_no_others(tmp_path: Path) -> None:
+    (tmp_path / "given.csv").write_text("time_s\n7.5\n2\n14.25\n", encoding="utf-8")
+    options = ["--blinks-at", str(tmp_path / "given.csv"), "--duration", "20", "--fps", "100"]
+    curves = _blinks(tmp_path, *options, "--complete", "1")
+    eyes = [curves[name] for name in ("closure_left", "closure_right")]
+    # an eye may follow the other by a few hundredths of a second
+    first = np.minimum(*(_onsets_in(eye, 100) for eye in eyes))
+    assert first == pytest.approx([2, 7.5, 14.25], abs=0.03)
+    assert [max(eye) for eye in eyes] == pytest.approx([1, 1], abs=0.01)
+
+
+def test_lively_eyes_blink_four_times_as_often_as_calm_ones(tmp_path: Path) -> None:
+    hour = ("--duration", "3600", "--fps", "50", "--lively")
+    curves = [_blinks(tmp_path, *hour, text)["closure_left"] for text in ("0", "0.5", "1")]
+    counts = [len(_onsets_in(curve, 50)) for curve in curves]
+    assert counts[0] < counts[1] < counts[2]
+    assert counts[2] / counts[0] == pytest.approx(4, rel=0.35)
+
+
+@pytest.mark.parametrize(("name", "opened"), [("liveportrait", 0.3), ("ditto", 0.9)])
+def test_eye_ratios_are_read_by_numpy(tmp_path: Path, name: str, opened: float) -> None:
+    curve = AnimationCurve(25, *np.array([[0, 0.5, 1], [0, 0, 1], [0, 0, 0], [0, 0, 0]]), ())
+    (tmp_path / "eyes.csv").write_text(write_curve(name, curve, CurveTarget()), encoding="utf-8")
+    ratios = np.loadtxt(tmp_path / "eyes.csv", delimiter=",")
+    # the person's left eye, half closed in the second frame, is on the right of the picture
+    assert ratios == pytest.approx(np.array([[1, 1], [1, 0.5], [0, 0]]) * opened)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        ("seconds\n1\n", [], "expected a column time_s or onset_s, got seconds"),
+        ("time_s\nsoon\n", [], "time_s: expected seconds"),
+        ("time_s\n99\n", [], "expected times from 0 to 10 s"),
+        ("time_s\n1\n", ["--rate", "20"], "remove --rate and --lively"),
+        ("time_s\n1\n", ["--complete", "2"], "expected --complete from 0 to 1, got 2"),
+    ],
+)
+def test_given_blinks_that_cannot_be_are_one_line(
+    tmp_path: Path, text: str, options: list[str], said: str
+) -> None:
+    (tmp_path / "given.csv").write_text(text, encoding="utf-8")
+    out = tmp_path / "out.csv"
+    arguments = ["performance", "--blinks-at", str(tmp_path / "given.csv"), "--duration", "10"]
+    done = CliRunner().invoke(app, [*arguments, "--out", str(out), *options])
+    assert isinstance(done.exception, InputError)
+    assert said in str(done.exception)
+    assert not out.exists()
