@@ -327,7 +327,8 @@ def export(
     format_name: Annotated[
         str,
         typer.Option(
-            "--format", help="csv, json, blender (a script), maya (.anim), arkit (CSV), gltf or usd (.usda)."
+            "--format",
+            help="csv, json, blender (a script), maya (.anim), arkit, gltf, usd, liveportrait or ditto.",
         ),
     ] = "csv",
     fps: Annotated[
