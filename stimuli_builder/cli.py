@@ -72,6 +72,10 @@ COMMANDS = {
         "stimuli_builder.clips.cli",
         "Write manifest.json for a folder of your own clips, so that a server can use them.",
     ),
+    "siti": (
+        "stimuli_builder.clips.cli",
+        "Measure how much detail (SI) and motion (TI) videos have, by ITU-T P.910.",
+    ),
     "strips": (
         "stimuli_builder.clips.cli",
         "Write picture strips of the shipped characters at 33 closures, for the dashboard's blinks page.",

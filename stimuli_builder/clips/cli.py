@@ -1,4 +1,4 @@
-"""`stimuli plan`, `build`, `verify`, `checks`, `manifest` and `strips`."""
+"""`stimuli plan`, `build`, `verify`, `checks`, `manifest`, `siti` and `strips`."""
 
 import json
 import sys
@@ -75,6 +75,7 @@ def register(app: typer.Typer) -> None:
     app.command("checks", help=CHECKS_HELP)(checks_command)
     app.command("clip", help=CLIP_HELP)(clip_command)
     app.command("manifest", help=MANIFEST_HELP)(manifest_command)
+    app.command("siti", help=SITI_HELP)(siti_command)
     app.command("strips", help=STRIPS_HELP)(strips_command)
     app.command("verify", help=VERIFY_HELP)(verify_command)
 
@@ -329,6 +330,57 @@ def _looking_into(total: int) -> Iterator[Callable[[int], None]]:
 
 
 # `stimuli strips`: the pictures that the dashboard's blinks page plays.
+
+SITI_HELP = """
+Measure how much detail (SI) and motion (TI) videos have, by ITU-T P.910.
+
+Sources of a quality study should cover a range of both. Values are of 8-bit luminance; of several frames the
+largest counts.
+
+Examples:
+
+  stimuli siti my-clips
+
+  stimuli siti a.mp4 b.mp4 --out siti.csv
+"""
+
+
+def siti_command(
+    videos: Annotated[list[Path], typer.Argument(help="Videos, or folders of videos.", show_default=False)],
+    out: Annotated[Path | None, typer.Option(help="CSV file to write: file, si, ti.")] = None,
+) -> None:
+    """Print SI and TI of each video."""
+    import csv
+
+    from experiments.files import check_targets, whole_text
+    from stimuli_builder.clips.preview import spatial_temporal_information
+    from video_conversion.prepared import VIDEO_ENDINGS
+
+    check_targets([out], videos)
+    files = [
+        file
+        for path in videos
+        for file in (sorted(path.iterdir()) if path.is_dir() else [path])
+        if not path.is_dir() or file.suffix.lower() in VIDEO_ENDINGS
+    ]
+    if not files:
+        raise InputError(f"expected videos, found none in {', '.join(map(str, videos))}")
+    with progress_bar("measuring") as report:
+        rows = []
+        for number, file in enumerate(files, start=1):
+            rows.append((file.name, *spatial_temporal_information(file)))
+            report(number, len(files))
+    width = max(len(name) for name, *_ in rows)
+    print(f"{'file':<{width}}     SI     TI")
+    for name, si, ti in rows:
+        print(f"{name:<{width}}  {si:5.1f}  {ti:5.1f}")
+    if out is not None:
+        with whole_text(out) as stream:
+            table = csv.writer(stream, lineterminator="\n")
+            table.writerow(("file", "si", "ti"))
+            table.writerows((name, f"{si:.3f}", f"{ti:.3f}") for name, si, ti in rows)
+        print(f"written: {out}")
+
 
 STRIPS_HELP = """
 Write picture strips of the shipped characters at 33 closures, for the dashboard's blinks page.

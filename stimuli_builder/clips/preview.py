@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import av
+import cv2
 import numpy as np
 from jinja2 import Environment, PackageLoader
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from experiments.manifest import Clip, Manifest
 from stimuli_builder.characters.declaration import write_bytes
 from stimuli_builder.clips.characters import find_character, geometry, shipped_names
 from stimuli_builder.clips.curves import samples_per_frame
+from stimuli_builder.video import decode
 
 Rgb = NDArray[np.uint8]
 THUMBNAIL_PX = (200, 160)
@@ -164,3 +166,47 @@ def write_strips(folder: Path, characters: Sequence[str] = ()) -> list[tuple[str
     }
     write_bytes(folder / STRIPS_FILE, (json.dumps(declared, indent=2) + "\n").encode())
     return written
+
+
+# How much detail and motion clips have: spatial and temporal information by ITU-T P.910.
+
+
+def spatial_temporal_information(path: Path) -> tuple[float, float]:
+    r"""SI and TI of a video, in code values of its luminance (8 bits).
+
+    Parameters
+    ----------
+    path : pathlib.Path
+
+    Returns
+    -------
+    si, ti : float
+        TI is 0 for a single frame.
+
+    Raises
+    ------
+    InputError
+        No video, or a damaged one.
+
+    Notes
+    -----
+    ITU-T P.910, section 7.8. With the luminance :math:`F_n` of frame n and the standard deviation over pixels
+
+    .. math::
+
+        SI = \max_n \mathrm{sd}[\mathrm{Sobel}(F_n)], \qquad
+        TI = \max_n \mathrm{sd}[F_n - F_{n-1}] \tag{1}
+
+    The Sobel magnitude is that of two 3 x 3 kernels with weights 1, 2, 1; the outermost pixels have none.
+    """
+    si = ti = 0.0
+    before = None
+    for _, picture in decode(path):
+        luminance = picture.astype(np.float64)
+        across = cv2.Sobel(luminance, cv2.CV_64F, 1, 0)[1:-1, 1:-1]
+        down = cv2.Sobel(luminance, cv2.CV_64F, 0, 1)[1:-1, 1:-1]
+        si = max(si, float(np.hypot(across, down).std()))
+        if before is not None:
+            ti = max(ti, float((luminance - before).std()))
+        before = luminance
+    return si, ti
