@@ -99,6 +99,7 @@ class ItemFactors:
             if factor != without
             for level in self.names(factor)[1:]
         ]
+        # Without a column the array is empty and has to be given its shape.
         design = np.array(columns).T.reshape(len(items), len(columns))
         # The mean is not identified: comparisons only say something about differences.
         centred = design - design.mean(axis=0)
@@ -155,6 +156,7 @@ def factor_tests(
         names = factors.names(factor)
         own = slice(column, column + len(names) - 1)
         column += len(names) - 1
+        # Without that factor and otherwise the same: the two models differ in its coefficients alone.
         smaller = fit(Model(model.method, factors.design(items, factor), model.order_effect), counts)
         chi2 = 2 * (whole.log_likelihood - smaller.log_likelihood)
         errors = np.sqrt(np.diag(whole.covariance)[own])
@@ -523,6 +525,7 @@ def _with_equivalence(
         return contrasts
     tested = []
     for c in contrasts:
+        # With raters known the test has them as clusters, and as many df as raters less one.
         se, df = (c.se, float("inf")) if c.se_robust is None else (c.se_robust, float(raters - 1))
         p = equivalence_p(c.difference, se, df, bounds) if se > 0 else None
         tested.append(replace(c, p_equivalence=p))

@@ -84,6 +84,7 @@ class Comparisons:
         parts = {name: replace(own, content=None) for name, own in parts.items()}
         if "all" in parts:
             raise InputError(f"{self.source}: a content is called all, as all contents together; rename it")
+        # Contents that share no item have no common scale, so that all together could not be fitted.
         shared = len(_components(self, strong=False)) == 1
         return {**({"all": self} if shared and len(parts) > 1 else {}), **parts}
 
@@ -243,6 +244,7 @@ def _outcomes(
         outcome[said == tie] = TIE
     outcome[said == left] = LEFT
     outcome[said == right] = RIGHT
+    # A mark of a missing value is one only where it is neither an item's name nor the word for a tie.
     missing = np.isin(said, [mark for mark in MISSING_MARKS if mark != tie]) & (outcome < 0)
     _refuse_unknown(table, outcome, missing, said, winner)
     if missing.any():
@@ -307,6 +309,7 @@ def separated_items(comparisons: Comparisons) -> str | None:
         return None
     wins = _wins(comparisons)
     position = {item: index for index, item in enumerate(comparisons.items)}
+    # The smallest first: one item that always wins is plainer to name than all others that always lose.
     for group in sorted(groups, key=len):
         inside = np.zeros(len(comparisons.items), dtype=bool)
         inside[[position[item] for item in group]] = True

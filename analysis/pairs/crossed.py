@@ -59,6 +59,7 @@ class RaterBlocks:
     def __init__(self, data: CrossedPairs, sd: Array, weight: Array) -> None:
         (raters, items), g, left, right = data.shape, data.rater, data.left, data.right
         blocks = np.zeros((raters, items, items))
+        # Weight times (e_left - e_right)(e_left - e_right)': added at both items, less between them.
         for one, other, sign in ((left, left, 1), (right, right, 1), (left, right, -1), (right, left, -1)):
             np.add.at(blocks, (g, one, other), sign * sd[0] ** 2 * weight)
         blocks += np.eye(items)
@@ -129,6 +130,7 @@ class CrossedLikelihood:
             blocks = RaterBlocks(data, sd, t.weight)
             of_u, of_v = self._carried(t.slope, sd)
             score = of_u - self.u, of_v - self.v
+            # Without contents and items the second vector is empty, and has no maximum.
             if max(np.abs(score[0]).max(), np.abs(score[1]).max(initial=0)) < 1e-9 * (1 + abs(value)) ** 0.5:
                 return t, blocks
             (step_u, step_v), size = blocks.solve(*score), 1.0
@@ -149,12 +151,14 @@ class CrossedLikelihood:
         data, f = self.data, self.data.x.shape[1]
         e, sd = data.edges.shape[1], theta[f + data.edges.shape[1] :]
         thresholds = data.edges @ theta[f : f + e]
+        # Thresholds out of order have no likelihood: the search has to turn back.
         if np.any(np.diff(thresholds) <= 0):
             return -np.inf, np.zeros_like(theta)
         t, h = self._modes(thresholds, data.x @ theta[:f], sd)
         scale, others, blocks = sd[data.of_column], data.others, h.rater_blocks()
         g, left, right = data.rater, data.left, data.right
         value = t.log_likelihood - float((self.u**2).sum() + self.v @ self.v) / 2 - h.log_det / 2
+        # z'H^-1 z of each comparison, z = sigma (e_left - e_right): of raters, of the others, of both.
         spread = blocks[g, left, left] + blocks[g, right, right] - 2 * blocks[g, left, right]
         spread *= sd[0] ** 2
         scaled = sparse.csr_array(others * scale[None, :])
@@ -214,6 +218,7 @@ def crossed_pairs(comparisons: Comparisons, model: Model, *, items_vary: bool) -
             f"--crossed takes {OTHERS_MAX} contents times items at most, got {others.shape[1]}; remove --by"
         )
     ties = model.method == "rao-kupper"
+    # From a win of the right item to one of the left, in the direction in which eta moves them.
     steps = {LEFT: 2 if ties else 1, RIGHT: 0, TIE: 1}
     category = np.array([steps[k] for k in (LEFT, RIGHT, TIE)], dtype=np.int64)[comparisons.outcome]
     # thresholds: -delta -+ tau; without both they are fixed at zero
@@ -243,6 +248,7 @@ def fit_crossed(data: CrossedPairs, start: Fit) -> tuple[Fit, tuple[RandomEffect
         Where it has no maximum inside the parameters' limits.
     """
     number = len(data.names)
+    # Not from zero: the likelihood is even in an SD, so that the search would never leave it.
     theta, value = _maximum(data, np.concatenate([start.parameters, np.full(number, 0.5)]), ())
     effects = []
     for index, name in enumerate(data.names):
@@ -251,6 +257,7 @@ def fit_crossed(data: CrossedPairs, start: Fit) -> tuple[Fit, tuple[RandomEffect
         smaller = _maximum(data, without, (len(start.parameters) + index,))[1]
         chi2 = max(0.0, 2 * (value - smaller))
         p = float(stats.chi2.sf(chi2, 1)) / 2 if chi2 > 0 else 1.0
+        # The likelihood is even in an SD: a negative one is the same model.
         sd = abs(float(theta[len(start.parameters) + index]))
         effects.append(RandomEffect(name, data.levels[index], sd, chi2, p))
     covariance = _covariance(data, theta)[: len(start.parameters), : len(start.parameters)]
@@ -264,8 +271,10 @@ def _maximum(data: CrossedPairs, theta: Array, fixed: tuple[int, ...]) -> tuple[
     def loss(values: Array) -> tuple[float, Array]:
         whole[free] = values
         value, gradient = likelihood.evaluate(whole)
+        # A finite wall in place of infinity, from which the line search steps back.
         return (-value, -gradient[free]) if np.isfinite(value) else (1e300, np.zeros(free.size))
 
+    # The gradient is a sum over comparisons: what counts as zero grows with their number.
     gtol = 1e-5 * len(data.x) ** 0.5
     optimum = optimize.minimize(loss, theta[free], jac=True, method="BFGS", options={"gtol": gtol})
     whole[free] = optimum.x

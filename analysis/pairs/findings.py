@@ -76,6 +76,7 @@ def findings_of(comparisons: Comparisons, factors: ItemFactors | None) -> Findin
     return Findings(
         abilities,
         None,
+        # A penalized likelihood cannot be compared with that of equation (1).
         None if firth else equal_abilities(comparisons, abilities),
         _order(comparisons, method, firth),
         fitted,

@@ -132,6 +132,7 @@ def _profile(pairs: FittedPairs, row: Array) -> tuple[float, float]:
     mu such that l is at that height.
     """
     spread = float(row @ pairs.fitted.covariance @ row)
+    # A function that is fixed, such as the ability of the reference item: its interval is a point.
     if spread <= 0:
         return 0.0, 0.0
     step = STEPS.get(pairs.model.method, softmax_step)
@@ -139,6 +140,7 @@ def _profile(pairs: FittedPairs, row: Array) -> tuple[float, float]:
     best = step(pairs.model, pairs.counts, pairs.fitted.parameters, False)[0]
     ends = []
     for sign in (-1.0, 1.0):
+        # Begun at the Wald end, where a quadratic likelihood would have its end as well.
         at = pairs.fitted.parameters + sign * np.sqrt(2 * height / spread) * (pairs.fitted.covariance @ row)
 
         def reached(log_mu: float, sign: float = sign) -> float:
@@ -146,10 +148,12 @@ def _profile(pairs: FittedPairs, row: Array) -> tuple[float, float]:
             at = _climb(pairs, sign * np.exp(-log_mu) * row, at)
             return float(step(pairs.model, pairs.counts, at, False)[0] - best + height)
 
+        # The multiplier that a quadratic likelihood has at that height.
         middle = 0.5 * np.log(spread / (2 * height))
         width = 0.25
         while reached(middle - width) > 0 or reached(middle + width) < 0:
             width *= 2
+        # The root itself is not needed: the evaluations leave the point in `at`.
         optimize.brentq(reached, middle - width, middle + width, xtol=1e-11)
         ends.append(float(row @ at))
     return ends[0], ends[1]
@@ -159,6 +163,7 @@ def _climb(pairs: FittedPairs, slope: Array, start: Array) -> Array:
     """Maximum of the log-likelihood plus `slope`'theta, by Newton steps that are halved where they lose."""
     step = STEPS.get(pairs.model.method, softmax_step)
     at, value, gradient, information, *_ = start, *step(pairs.model, pairs.counts, start, False)
+    # Where the likelihood is not finite at the start, the estimate is a safe one.
     if not np.isfinite(value):
         at = pairs.fitted.parameters
         value, gradient, information, *_ = step(pairs.model, pairs.counts, at, False)
@@ -185,6 +190,7 @@ def resampled_parameters(pairs: FittedPairs, samples: int) -> tuple[Array, int]:
     InputError
         Where most samples have none.
     """
+    # A fixed seed: the same table gives the same intervals.
     random = np.random.default_rng(SEED)
     raters = pairs.comparisons.participant is not None
     of_raters = count_by_rater(pairs.comparisons, pairs.counts) if raters else None
@@ -194,6 +200,7 @@ def resampled_parameters(pairs: FittedPairs, samples: int) -> tuple[Array, int]:
         if len(draws) == samples:
             return np.array(draws), tried - samples
         if of_raters is None:
+            # Comparisons of one pair with one outcome are alike: how often each is drawn is multinomial.
             share = pairs.counts.outcomes.ravel() / number
             drawn = random.multinomial(number, share).astype(np.float64)
         else:
@@ -302,12 +309,14 @@ def _question_pair(
     abilities: dict[str, Array],
 ) -> QuestionPair:
     df = len(items) - 1
+    # Abilities against their mean sum to zero, so that one of the items is redundant.
     square = float(difference[1:] @ np.linalg.pinv(covariance[1:, 1:]) @ difference[1:])
     f_value: float | None = None
     p: float | None = None
     if raters is None:
         f_value, p = square / df, float(stats.chi2.sf(square, df))
     elif raters > df:
+        # Hotelling's T^2 as an F value, since the covariance is estimated from the same raters.
         f_value = square * (raters - df) / ((raters - 1) * df)
         p = float(stats.f.sf(f_value, df, raters - df))
     df_error = None if raters is None or raters <= df else float(raters - df)

@@ -139,6 +139,7 @@ def scale_jod(
             _scaled(name, own, prior, reference, reference_jod, bootstrap, decisions)
             for name, own in kept.items()
         ]
+        # All contents together would count every answer a second time.
         apart = {name: own for name, own in kept.items() if name != "all" or len(kept) == 1}
         observers = screen_observers(apart, prior, decisions) if screen else ()
     first = next(iter(contents.values()))
@@ -178,6 +179,7 @@ def _scaled(
     at = None if reference is None else own.items.index(reference)
 
     def anchored(values: Array, by: Array) -> list[float]:
+        # The ends of intervals get the zero of the estimate, so that all lie on one scale.
         zero = float(by.mean() if at is None else by[at])
         return [float(value) - zero + reference_jod for value in values]
 
@@ -187,6 +189,7 @@ def _scaled(
     if own.participant is not None and bootstrap and len(wins) > 1:
         draws = _resampled(wins, prior, scores, bootstrap)
         low, high = (anchored(np.quantile(draws, q, axis=0, method="hazen"), scores) for q in (0.025, 0.975))
+    # Comparisons of an item with itself are on the diagonal, and no item wins those.
     apart = total - np.diag(np.diag(total))
     items = zip(
         own.items,
@@ -255,6 +258,7 @@ def _resampled(wins: Array, prior: Prior, start: Array, number: int) -> Array:
     for _ in range(TRIES * number):
         if len(draws) == number:
             return np.array(draws)
+        # How often each rater is drawn: a weighted sum of matrices takes the place of copied rows.
         counts = np.bincount(random.integers(len(wins), size=len(wins)), minlength=len(wins))
         total = np.tensordot(counts, wins, axes=1)
         if prior == "gaussian" or _has_maximum(total):
@@ -277,6 +281,7 @@ def _maximum(total: Array, prior: Prior, start: Array | None = None) -> tuple[Ar
     begin = np.zeros(len(total)) if start is None else start
     # pwcmp's mean of zero makes the information regular
     inverse = np.linalg.inv(information(begin) + MEAN_WEIGHT / len(total) ** 2)
+    # BFGS takes a first inverse only if it is symmetric to the last digit.
     optimum = optimize.minimize(
         loss, begin, jac=True, method="BFGS", options={"gtol": 1e-6, "hess_inv0": (inverse + inverse.T) / 2}
     )
@@ -311,6 +316,7 @@ def _posterior(
 
     def information(q: Array) -> Array:
         d = signs @ q / SIGMA
+        # By logarithms, since density and probabilities all vanish far out.
         weight = n * np.exp(2 * stats.norm.logpdf(d) - stats.norm.logcdf(d) - stats.norm.logcdf(-d))
         return np.asarray((signs.T * weight) @ signs / SIGMA**2, dtype=np.float64)
 
@@ -322,6 +328,7 @@ def _posterior(
         slope = won * toward - (n - won) * away
         if prior == "gaussian":
             explained = np.outer(log_p, shifted) + np.outer(log_other, n - shifted)
+            # Less the largest, so that exp cannot overflow; the shares stay the same.
             share = np.exp(explained - explained.max(axis=0))
             share /= share.sum(axis=0)
             each = share.sum(axis=1) + PRIOR_FLOOR
@@ -354,6 +361,7 @@ def screen_observers(
             # without this observer an item may never have lost: only the prior then has a maximum
             fitted = prior if _has_maximum(others) else "gaussian"
             scores = _maximum(others, fitted, start)[0]
+            # Each pair once: the sum has it in both orders.
             n = np.triu(wins[k] + wins[k].T, 1)
             first, second = np.nonzero(n)
             p = stats.norm.cdf((scores[first] - scores[second]) / SIGMA)
@@ -476,6 +484,7 @@ def rate_elo(comparisons: Comparisons, k_factor: float = 32.0, samples: int = 50
     _refuse_all_ties(comparisons)
     refuse_disconnected(comparisons)
     n, random = comparisons.outcome.size, np.random.default_rng(SEED)
+    # Rows times samples are in memory at once: a larger table gets fewer samples.
     used = min(samples, max(SAMPLES_MIN, CELLS_MAX // n)) if samples else 0
     orders = used or SAMPLES_MIN
     rows = np.arange(n)
@@ -515,10 +524,12 @@ def rate_elo(comparisons: Comparisons, k_factor: float = 32.0, samples: int = 50
 
 def _last_ratings(comparisons: Comparisons, rows: Codes, k_factor: float) -> Array:
     """Ratings (samples, items) after the comparisons of each column of `rows` (n, samples), -1 for none."""
+    # Row -1 picks the last entry, a comparison that never was; its change is set to zero below.
     left, right = np.append(comparisons.left, 0), np.append(comparisons.right, 0)
     score = np.append(np.array([1.0, 0.0, 0.5])[comparisons.outcome], np.nan)
     samples = np.arange(rows.shape[1])
     ratings = np.full((rows.shape[1], len(comparisons.items)), CENTER)
+    # Row by row, but all samples at once: a rating depends on the comparisons before it.
     for row in rows:
         a, b, y = left[row], right[row], score[row]
         one, other = ratings[samples, a], ratings[samples, b]

@@ -146,6 +146,7 @@ def fit(model: Model, counts: Counts, *, firth: bool = False) -> Fit:
     # All items alike: for a concave likelihood any start will do, and this one lies inside.
     parameters = np.zeros(model.names)
     if model.method == "rao-kupper":
+        # Where all items are alike, P(tie) = tanh(tau / 2).
         share = counts.outcomes[:, TIE].sum() / counts.outcomes.sum()
         parameters[-1] = 2 * np.arctanh(share)
     previous = -np.inf
@@ -208,6 +209,7 @@ def _solved(information: Array, gradient: Array) -> Array:
 
 
 def _plain(counts: Counts, shares: Array) -> float:
+    # An outcome that never came adds 0 log 0 = 0, also where its share is 0.
     return float(np.sum(counts.outcomes * np.log(np.where(counts.outcomes > 0, shares, 1.0))))
 
 
@@ -288,6 +290,7 @@ def _rao_kupper_step(
     """
     del firth  # refused before: the penalty is derived for the logistic model
     gradients, shares = _rao_kupper_outcomes(model, counts, parameters)
+    # A negative tau gives ties a negative probability: the value is NaN, and `fit` halves the step.
     with np.errstate(invalid="ignore", divide="ignore"):
         value = float(np.sum(special.xlogy(counts.outcomes, shares)))
     gradient = np.einsum("mo,mop->p", counts.outcomes, gradients)

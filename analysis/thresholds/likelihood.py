@@ -80,6 +80,7 @@ class Likelihood:
     ) -> None:
         self.trials, self.shape, self.guess, self.lapse = trials, shape, guess, lapse
         centred = trials.x - np.average(trials.x, weights=trials.n)
+        # The sign of the covariance of stimulus and answer.
         seen = guess == 0.0 and float(np.sum(centred * trials.k)) < 0
         self.falling = seen if falling is None else falling
         self.width = float(trials.x.max() - trials.x.min())
@@ -134,6 +135,7 @@ class Likelihood:
 
     def _scanned(self, negative: Callable[[Array], float], bounds: list[tuple[float, float]]) -> Array:
         """The best of a grid within `bounds`: far from the maximum the profile leaves its start's valley."""
+        # The range of the lapse rate is short: three values are enough.
         sizes = [3 if high == LAPSE_MAX else GRID for _, high in bounds]
         axes = [np.linspace(low, high, size) for (low, high), size in zip(bounds, sizes, strict=True)]
         return np.array(min(product(*axes), key=lambda values: negative(np.array(values))))
@@ -157,6 +159,7 @@ class Likelihood:
         for index, (low, high) in enumerate(bounds):
             moved = values.copy()
             step = 1e-3 * max(1e-3, min(1.0, abs(values[index])))
+            # Inward where the bound is near: a corner cut off there would leave the simplex without extent.
             moved[index] += step if values[index] + step <= high else -step
             corners.append(np.clip(moved, low, high))
         return np.array(corners)

@@ -132,6 +132,7 @@ class PopulationLikelihood:
         self, trials: Sequence[Trials], shape: Shape, guess: float, lapse: float, falling: bool
     ) -> None:
         size = max(len(one.x) for one in trials)
+        # The padding has n = 0 and says nothing, whatever its x.
         self.x, self.n, self.k = (
             np.array([np.pad(getattr(one, name), (0, size - len(one.x))) for one in trials])[:, None, :]
             for name in ("x", "n", "k")
@@ -156,6 +157,7 @@ class PopulationLikelihood:
         """
         mu, log_tau, nu, log_omega = values
         location = mu + np.exp(log_tau) * u[..., :1]
+        # During the search a log spread may have any size: exp must not overflow.
         log_spread = np.clip(nu + np.exp(log_omega) * u[..., 1:], -30.0, 30.0)
         z = (self.x - location) * np.exp(-log_spread)
         rising = special.ndtr(z) if self.shape == "normal" else special.expit(z)
@@ -415,6 +417,7 @@ def _people(
 def mean_threshold(people: list[PersonThreshold], condition: str) -> MeanThreshold | None:
     """Average thresholds over people; None below two people."""
     own = [one.fit for one in people if one.condition == condition and one.fit is not None]
+    # A threshold without an error has no weight in the mean.
     known = [(fit.threshold, fit.threshold_se) for fit in own if fit.threshold_se]
     made = average(np.array([a for a, _ in known]), np.array([float(b or 0) for _, b in known]))
     return None if made is None else MeanThreshold(**vars(made), condition=condition)

@@ -308,6 +308,7 @@ def fit_plane(
     # b1.
     gradients = np.array([[-spread, -threshold * spread, 0.0], [0.0, -tilt * spread, -spread]])
     errors = np.sqrt(np.einsum("ij,jk,ik->i", gradients, covariance, gradients))
+    # The profiles count z from 0 and not from the middle, which moves the constant.
     profile = PlaneProfiles(link, x, points.z, value, (float(beta[0] - beta[2] * middle), beta[1], beta[2]))
     deviance, df = link.deviance(beta, columns), points.n.size - 3
     line = tuple(
@@ -362,5 +363,6 @@ def _broad(x: Array, width: float) -> list[Array]:
 def _turned(interval: Interval, sign: float) -> Interval:
     if sign > 0:
         return interval
+    # A change of sign turns the ends about.
     low, high = interval.high, interval.low
     return Interval(None if low is None else -low, None if high is None else -high)

@@ -135,6 +135,7 @@ class MarginalLikelihood:
     def start(self) -> Array:
         """The pooled fit, with people who differ by half its spread."""
         fit = self.pooled
+        # A pooled spread near zero would start the search on a step, whose gradient says little.
         spread = max(fit.spread, 0.02 * self.width)
         logs = np.log([spread, spread / 2, 0.1 * self.slope_unit])
         return np.array([self.sign * fit.threshold, self.sign * fit.tilt, *logs])
@@ -245,6 +246,7 @@ def _next(below: tuple[float, float], above: tuple[float, float] | None, root: f
     if above is None:
         away, height = below
         return away * (min(4.0, max(1.5, 1.1 * root / height)) if height > 0 else 4.0)
+    # Away from both ends: a secant that lands next to one hardly narrows the bracket.
     share = (root - below[1]) / (above[1] - below[1])
     return below[0] + min(max(share, 0.15), 0.85) * (above[0] - below[0])
 

@@ -68,6 +68,7 @@ def _compared(
     both = sorted(first.keys() & second.keys())
     if both:
         gaps = np.array([first[name] - second[name] for name in both])
+        # Without variance the t test would divide by zero.
         if len(both) < 2 or not np.ptp(gaps) > 0:
             return None
         test: Any = stats.ttest_1samp(gaps, 0.0)

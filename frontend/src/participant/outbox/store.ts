@@ -76,6 +76,7 @@ export class IndexedDbStore implements OutboxStore {
       reading.onsuccess = () => resolve(reading.result);
       reading.onerror = () => reject(failure(reading.error));
     });
+    // The store is keyed by id: its order is not that of sending.
     return items.sort((a, b) => a.sequence - b.sequence);
   }
 

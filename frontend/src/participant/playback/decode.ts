@@ -26,6 +26,7 @@ export async function decodeClip(bytes: ArrayBuffer, declared_fps: number | null
   // No more packets are counted than it takes to know.
   const { packetCount, averagePacketRate } = await track.computePacketStats(kept + 1);
   const fps = declared_fps ?? averagePacketRate;
+  // Imported only for a long clip: other visits do without the file.
   if (packetCount > kept) return (await import("./streamed-clip")).streamedClip(track, config, fps, width, height);
   const frames = await decodeAll(config, new EncodedPacketSink(track));
   const first = frames[0];
@@ -45,6 +46,7 @@ async function decodeAll(config: VideoDecoderConfig, sink: EncodedPacketSink): P
   try {
     decoder.configure(config);
     for await (const packet of sink.packets()) {
+      // A decoder that has failed is closed: feeding it further would throw another error and hide the first.
       if (problems.length > 0) break;
       decoder.decode(packet.toEncodedVideoChunk());
     }

@@ -96,6 +96,7 @@ export class RefreshClock {
 
   private run(now: number): void {
     this.count += 1;
+    // The job may have been stopped between the refresh and its run.
     this.job?.(this.origin_ms + now, this.now_ms());
   }
 }
@@ -132,6 +133,7 @@ export class EvennessMeter {
 export function meanGap(stamps: readonly number[]): number | null {
   const gaps = stamps.slice(1).map((stamp, index) => stamp - (stamps[index] ?? stamp));
   const median = [...gaps].sort((a, b) => a - b)[Math.floor(gaps.length / 2)];
+  // Zero as well: stamps that are rounded so coarsely say nothing of the rate.
   if (!median) return null;
   // A rounded gap is one longer or shorter: on a screen of 240 Hz that is a quarter.
   const regular = gaps.filter((gap) => Math.abs(gap - median) < Math.max(median / 4, 1.01));

@@ -29,6 +29,7 @@ interface Waiting {
 
 /** A change of the page's layout delays the clip's first frames on their way to the screen. */
 function layoutShown(): Promise<void> {
+  // The first callback comes before the new layout is painted, the second after it.
   return new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(() => resolve())));
 }
 
@@ -141,6 +142,7 @@ export class WorkerPlayer implements ClipPlayer {
   }
 
   private broken(reason: string): void {
+    // Of a copy of the keys, since each request that is settled leaves the map.
     for (const request of [...this.waiting.keys()]) this.settle(request, new ClipBroken(reason));
   }
 

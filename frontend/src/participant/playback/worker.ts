@@ -71,6 +71,7 @@ function release(sha256: string): void {
 }
 
 function close(clip: SingleClip | Composed): void {
+  // A composed clip owns no pictures: its parts are released under their own hashes.
   if ("bitmaps" in clip) clip.bitmaps.forEach((bitmap) => bitmap.close());
   else if ("close" in clip) clip.close();
 }

@@ -119,6 +119,7 @@ export class ClipCache {
 
   /** Fetch what is missing; resolves with the clips that could not be had, after all others are here. */
   async load(sources: ClipSource[], report: (progress: Progress) => void = () => {}, signal?: AbortSignal): Promise<ClipUnavailable[]> {
+    // Trials share clips: each is fetched and counted once.
     const distinct = [...new Map(sources.map((source) => [source.clip_sha256, source])).values()];
     const queue = [...distinct];
     const failed: ClipUnavailable[] = [];

@@ -40,6 +40,7 @@ export function askAnswer<Name extends string>(container: HTMLElement, options: 
     let over = false;
     const buttons = new Map<Name, HTMLButtonElement>();
     const choose = (name: Name, time_stamp: number): void => {
+      // Within the time in which the key is seen to go down, a second press must not answer as well.
       if (over) return;
       over = true;
       buttons.get(name)?.setAttribute("aria-pressed", "true");
@@ -66,6 +67,7 @@ export function askAnswer<Name extends string>(container: HTMLElement, options: 
     container.replaceChildren(question, group);
     listenKeys((event) => {
       const key = keyOf(event);
+      // A letter answers with Caps Lock on, too; keys with a longer name keep it as it is.
       const name = keyed(key.length === 1 ? key.toLowerCase() : key);
       if (!name) return;
       event.preventDefault();

@@ -54,6 +54,7 @@ export async function saveRating(session: Session, trial: TrialInfo, body: Ratin
     const { again, warning } = receiptOf(outcome) ?? {};
     if (again) session.replays.add(trial, body.play + 1);
     if (warning) session.warnings.push(warning);
+    // Another page has answered this trial meanwhile: only one of them may go on.
     if (!outcome.accepted && outcome.refused.code === "rating_differs") session.root.dispatchEvent(new CustomEvent("taken-over"));
   });
   if (!session.outbox.durable) await waitShown(session, handled);

@@ -84,6 +84,7 @@ export function waitForStart(
     const start = (event: Event): void => {
       if (!meant.allows(event)) return;
       done();
+      // The time of the press itself: a busy page may come to handle it later.
       resolve(performance.timeOrigin + event.timeStamp);
     };
     const go = button(t("start"), () => {});
@@ -118,7 +119,9 @@ export async function showOnce(
   document.addEventListener(
     "keydown",
     (event) => {
+      // A key that is held down repeats by itself, which is one early press and not many.
       if (!event.repeat && event.key.length === 1) early_keys += 1;
+      // The browser would scroll the page by a space.
       if (event.key === " ") event.preventDefault();
     },
     { signal },
@@ -134,6 +137,7 @@ export async function showOnce(
     const disturbances = dropped ? { ...counts, refresh_dropped: 1 } : counts;
     return { ...shown, key_at_ms, focus_lost, visible_share, disturbances, early_keys };
   } finally {
+    // Also where the play has failed: nothing is watched beyond it.
     watched.stop();
     done();
     stage.setPlaying(false);

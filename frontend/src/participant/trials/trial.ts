@@ -47,6 +47,7 @@ const SOON_MS = 150;
 
 /** What `make` gives; meanwhile the place says, where it takes long, what is waited for. Whatever fails is a ClipBroken. */
 export async function whileDecoding<Made>(session: Session, stage: Stage | null, make: () => Promise<Made>): Promise<Made> {
+  // Only where it takes long: a word that flashes up for a moment draws the eye.
   const say = setTimeout(() => stage?.below.replaceChildren(h("p", { role: "status" }, session.t("decoding"))), SOON_MS);
   try {
     return await make();
@@ -59,6 +60,7 @@ export async function whileDecoding<Made>(session: Session, stage: Stage | null,
 
 /** Decode one clip of a trial, fetched where it is not here. Throws ClipBroken where it cannot be had. */
 async function decodeClip(session: Session, trial: TrialInfo, sha256: string, fps: TrialInfo["fps"]): Promise<void> {
+  // The preload may have gone on without this clip (`giveUp`).
   if (!session.clips.get(sha256)) await session.clips.load(sourcesOf([trial]));
   const bytes = session.clips.get(sha256);
   if (!bytes) throw new ClipBroken("the clip could not be loaded");
