@@ -200,6 +200,7 @@ def _named_roles(texts: Mapping[str, "pd.Series[str]"], numbers: Mapping[str, bo
         whole = [name for name in fitting if _is_whole(role, name)]
         if fitting:
             roles[(whole or fitting)[0]] = role
+    # Only all three are a comparison: a single column of these names may be a factor.
     if not {"left", "right", "winner"} <= {*roles.values()}:
         roles = {name: role for name, role in roles.items() if role not in ("left", "right", "winner")}
     person = next((name for name, role in roles.items() if role == "participant"), None)
@@ -211,6 +212,7 @@ def _named_roles(texts: Mapping[str, "pd.Series[str]"], numbers: Mapping[str, bo
             continue
         if re.fullmatch("age", name.strip(), re.IGNORECASE) and numbers[name]:
             roles[name] = "covariate"
+        # A column whose every value differs names the rows and was not varied.
         elif 2 <= values.nunique() <= MAX_LEVELS and values.nunique() < len(values):
             roles[name] = "between" if person and _one_value_each(column, texts[person]) else "within"
     if (
@@ -234,6 +236,7 @@ def _likely_measure(
 
 def _is_whole(role: str, name: str) -> bool:
     """Whether a name is one of the pattern's words, not only around one."""
+    # Split at bars outside parentheses only: those inside belong to one word.
     words = "|".join(part for part in re.split(r"\|(?![^(]*\))", NAMES[role]) if ".*" not in part)
     return re.fullmatch(words, name.strip(), re.IGNORECASE) is not None
 

@@ -104,6 +104,7 @@ class AnswersQuery:
     def _portions(self, selection: str) -> Iterator[Sequence[Any]]:
         # the driver's own cursor: SQLAlchemy's row objects cost a second a million rows
         query = text(f"SELECT {selection}").bindparams(**self._values)
+        # The driver's cursor does not know these parameters: the dialect writes their values into the text.
         sql = query.compile(self._engine, compile_kwargs={"literal_binds": True})
         cursor = self._connection.connection.cursor()
         try:
@@ -123,6 +124,7 @@ class _Codes:
 
     def add(self, values: Sequence[Any]) -> None:
         code = self._code
+        # Codes in the order of appearance: names are sorted once at the end.
         self._portions.append(np.array([code.setdefault(value, len(code)) for value in values], np.int32))
 
     def column(self) -> "pd.Categorical[str]":
@@ -146,6 +148,7 @@ class _Numbers:
 
 def _factor_columns(levels: "pd.Categorical[str]", factors: Sequence[str]) -> dict[str, Any]:
     """A column a factor from the JSON objects in `levels`; empty where a row has none."""
+    # Once per distinct text: a design has few cells, however many rows there are.
     parsed = [json.loads(level) if level else {} for level in levels.categories]
     columns: dict[str, Any] = {}
     for factor in factors:

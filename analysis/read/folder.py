@@ -145,6 +145,7 @@ def names_of(folder: Path, path: Path) -> dict[str, str]:
 def _known(folder: Path) -> Folder:
     """The folder as it is now; gone through once for the header and for the cells."""
     paths = _data_paths(folder)
+    # With times and sizes in the key: a file that has changed between two calls is read again.
     return _look_through(folder, tuple((p, p.stat().st_mtime_ns, p.stat().st_size) for p in paths))
 
 
@@ -190,6 +191,7 @@ def _is_psych_ds(folder: Path) -> bool:
 
 def _table(path: Path) -> pd.DataFrame:
     """All cells of a file, each column once; none of a file that holds nothing."""
+    # Byte order marks, separators and blanks alone are nothing.
     if not path.read_bytes().strip(b"\xef\xbb\xbf\xff\xfe\0\r\n\t ,;"):
         return pd.DataFrame()
     return delimited_cells(path, list(dict.fromkeys(delimited_table(path).header))).rows
@@ -213,6 +215,7 @@ def _joined(files: Sequence[DataFile], tables: Mapping[Path, pd.DataFrame]) -> l
     Where their rows are of few kinds, so that they may be alike by chance, it is said.
     """
     shared = [name for name in dict.fromkeys(files[0].header) if all(name in file.header for file in files)]
+    # It takes three files: two parts, and the one that they were joined into.
     if not shared or len(files) <= 2:
         return []
     counts = {file.path: row_counts(tables[file.path][shared]) for file in files}

@@ -145,6 +145,7 @@ def _repeats(
 
 def _report_copies(table: TextTable, names: list[str], values: NDArray[np.float64]) -> None:
     """Say it where every cell has one trial but a few rows are there twice: probably a copied row."""
+    # The second name is the rating; what is left describes the cell it is of.
     cells = table.columns[[n for n in names if n in table.columns]].drop(columns=names[1])
     counts = cells.groupby(list(cells.columns), observed=True).size()
     if counts.median() == 1 and counts.max() > 1:
@@ -196,6 +197,7 @@ def design_of(
         return no_groups(len(people))
     person, everybody = level_codes(rows[participant], participant)
     first = np.zeros(len(everybody), np.int64)
+    # Assigned from the last row to the first: what stays is the first row of each participant.
     first[person[::-1]] = np.arange(len(person))[::-1]
     position = {name: i for i, name in enumerate(everybody)}
     chosen = np.array([position[one] for one in people], np.int64)

@@ -31,6 +31,7 @@ def numbers(table: TextTable, name: str) -> NDArray[np.float64]:
     commas = [text for text in categories if _DECIMAL_COMMA.fullmatch(text)]
     if name not in table.numeric:
         _refuse_two_readings(table, name, categories, commas)
+    # The last entry is for code -1, of rows without a category: it gives NaN.
     values = np.array([_number(text) for text in [*categories, ""]])
     numeric = np.isfinite(values)
     _refuse_words(
@@ -161,6 +162,7 @@ def _number(text: str) -> float:
     """The number; NaN where the text is none, or is not finite."""
     plain = text.replace(",", ".") if _DECIMAL_COMMA.fullmatch(text) else text
     try:
+        # Python would read 1_000 as a number, which nobody means in a table.
         value = np.nan if "_" in plain else float(plain)
     except ValueError:
         value = np.nan

@@ -61,6 +61,7 @@ def pooled(
     rows = _of_number(rows, VERSION, pool.version, source, said)
     rows = _of_number(rows, SERIES, pool.series, source, said)
     rows = _of_origin(rows, pool.origin, said)
+    # The series last: the latest one depends on the version and on the origin.
     rows = _of_number(rows, SERIES, _series_of(rows, declaration_sha256), source, said)
     return rows, (*_named(rows, pool), *said, *_declarations(rows, declaration_sha256))
 

@@ -104,6 +104,7 @@ def load_database(
                 f"experiment '{experiment.name}' has no ratings yet in {query.name}; practice does not count"
             )
         rows, chosen = _of_one_study(rows, experiment.name, study, query.name)
+        # Asked for only where somebody has two runs, since it goes through the view once more.
         return StudyAnswers(rows, query.name, chosen, query.first_seen() if _runs_again(rows) else {})
     finally:
         query.close()

@@ -167,6 +167,7 @@ def read_text_table(
 
 def _copies(table: TextTable, names: Sequence[str]) -> str:
     """What is said of rows that are copies in every column of the file; those read are compared first."""
+    # Only where the columns that were read look copied, the whole file is read to compare all.
     if not said_of_copies(table.columns[list(names)], _Places(table)):
         return ""
     if table.reader is None:
@@ -212,6 +213,7 @@ def _leave_out_empty_rows(table: TextTable, names: Sequence[str]) -> None:
             f"rows without a value in any column that is used were excluded ({name_lines(table, empty)})"
         )
         left = table.columns[~empty].reset_index(drop=True)
+        # Else the empty text would stay a category, and count as a level.
         table.columns = left.apply(lambda column: column.cat.remove_unused_categories())
         table.lines = table.lines[~empty]
         table.files = None if table.files is None else table.files[~empty]

@@ -43,6 +43,7 @@ def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values
     # The median: a single frame with a hand in it must not set what is usual.
     usual = np.median(residuals, axis=0)
     # In logarithms, as errors grow by a factor with the residual, not by an amount.
+    # Not below a thousandth: the logarithm of a perfect fit is infinite.
     excess = np.log(np.maximum((residuals / usual).max(1), 1e-3))
     error = np.log([max(one.rms_px or 0.0, 1e-3) for one in seen])
     spread = float(((excess - excess.mean()) ** 2).sum())
@@ -50,6 +51,7 @@ def with_errors(model: CoupledModel, held_out: Sequence[HeldOut], limits: Values
     # A negative slope would state less error for a worse picture, which a handful of frames may suggest.
     slope = float(np.clip(slope, 0, STEEPEST)) * len(seen) / (len(seen) + 10)
     scale = np.maximum((residuals / usual).max(1), 1.0) ** slope
+    # Taken back to a usual residual: a frame states this error times its own factor.
     errors = np.array([one.point_errors_px for one in seen]) / scale[:, None]
     return with_residual_limits(model, limits, usual, np.sqrt((errors**2).mean(0)), slope)
 
@@ -175,6 +177,7 @@ def from_curve(point: Points, points: Points, start: int, curve: tuple[int, ...]
     for n in range(len(curve) - 1):
         a, b = points[start + curve[n]], points[start + curve[n + 1]]
         dx, dy, px, py = b[0] - a[0], b[1] - a[1], point[0] - a[0], point[1] - a[1]
+        # Two points of a curve may be one; the share is then 0.
         share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-12), 0.0), 1.0)
         nearest = min(nearest, math.hypot(px - share * dx, py - share * dy))
     return nearest

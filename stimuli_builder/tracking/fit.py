@@ -201,7 +201,9 @@ def work_out(model: CoupledModel) -> Algebra:
 
 def _diagonal(form: Values) -> Values:
     """Diagonal of a lower triangle laid out row by row."""
+    # K^2 < K (K + 1) < (K + 1)^2, so that the root cut to a whole number is K.
     size = int(np.sqrt(2 * len(form)))
+    # Row k of the triangle has k + 1 numbers, the last of them on the diagonal.
     return form[np.cumsum(np.arange(1, size + 1)) - 1]
 
 
@@ -228,6 +230,7 @@ class Fitter:
         algebra = work_out(model)
         mesh, pixels = model.mesh, model.mesh.pixel_count
         diagonal = _diagonal(algebra.hessian_forms[0])[: len(model.sd)]
+        # A mode without variance over the labeled frames would divide by zero.
         prior_of_c = RIDGE * diagonal + prior / np.maximum(model.sd, 1e-9) ** 2
         ends = mesh.ends
         self._mesh = MeshArrays(

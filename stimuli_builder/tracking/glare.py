@@ -84,6 +84,7 @@ class GlareCheck:
             points = fit.vertices[EYE_POINTS * eye : EYE_POINTS * (eye + 1)].astype(np.float64)
             share, outside, inside, quarter, opening = highlights(picture, points)
             wide = opening / float(self._usual[eye])
+            # A quartile of 0 means that hardly anything lies between the lids: it says nothing of an iris.
             dark = 0 < quarter <= DARK_IRIS
             # Whites may outshine dark skin, next to a dark iris: that is not a highlight.
             seen = outside >= LEAST_OUTSIDE or (inside >= BETWEEN and not dark)
@@ -123,6 +124,7 @@ def lid_at(u: float, along: Values, down: Values, curve: tuple[int, ...]) -> flo
     """How far down a lid's curve is at `u` along the canthi; 0 beyond them."""
     for n in range(len(curve) - 1):
         a, b = along[curve[n]], along[curve[n + 1]]
+        # Two points of a lid may lie at one place along the canthi, with no slope between them.
         if min(a, b) <= u <= max(a, b) and a != b:
             return float(down[curve[n]] + (u - a) / (b - a) * (down[curve[n + 1]] - down[curve[n]]))
     return 0.0
@@ -142,6 +144,7 @@ def opening_share(along: Values, down: Values) -> float:
 def level_at(picture: Picture, x: float, y: float) -> float:
     """Gray level between four pixels; the nearest ones beyond the picture."""
     height, width = picture.shape
+    # Just inside the last row and column, so that the pixels below and to the right exist.
     x, y = min(max(x, 0.0), width - 1.001), min(max(y, 0.0), height - 1.001)
     left, top = int(x), int(y)
     right_share, lower_share = x - left, y - top

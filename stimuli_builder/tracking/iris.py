@@ -177,6 +177,7 @@ def _height(lid: Values, u: float) -> float:
         if lid[n, 0] <= u <= lid[n + 1, 0]:
             share = (u - lid[n, 0]) / (lid[n + 1, 0] - lid[n, 0])
             return float(lid[n, 1] + share * (lid[n + 1, 1] - lid[n, 1]))
+    # An upper lid that is infinitely far down leaves the place out.
     return math.inf
 
 
@@ -233,6 +234,7 @@ def write_irises(info: VideoInfo, track: Path, out: Path, advance: Callable[[], 
         The track has another number of frames than the video, or is none.
     """
     header = next(iter(track_rows(track)), {})
+    # Columns are numbered from 1: eighteen points are those of two eyes.
     eyes = 2 if "x18" in header else 1
     names, diameters, count = point_columns(eyes), [], 0
     rows, pictures = track_rows(track), islice(frames(info.path), info.frame_count)

@@ -31,6 +31,7 @@ def compose(modes, c, first, last, out):
     part = out[first:last]
     part[:] = modes[0, first:last]
     i = 0
+    # Four modes in one pass, so that the output is read and written a quarter as often.
     while i + 4 <= count:
         w0, w1, w2, w3 = np.float32(c[i]), np.float32(c[i + 1]), np.float32(c[i + 2]), np.float32(c[i + 3])
         m0 = modes[i + 1, first:last]
@@ -181,6 +182,7 @@ def fit(picture, c, pose, max_iterations, tolerance, mesh, model, buffers):
         before[:] = vertices
         posed_vertices(mesh.vertices, model.shape_modes, c, pose, vertices)
         furthest = moved_by(vertices, before)
+        # Infinite where a number is not finite: the fit has broken down.
         if not furthest < 1e6:
             return 0
         if furthest < tolerance:

@@ -47,6 +47,7 @@ def plausible(labels: dict[int, Points]) -> dict[int, Points]:
     mean = mean_shape(shapes)
     rows = np.array([apply_pose(shape, similarity_between(shape, mean)) for shape in shapes])
     rows = rows.reshape(len(rows), -1)
+    # Each by the others alone: a bad detection must not help to explain itself.
     rest = np.array([_unexplained(np.delete(rows, k, axis=0), rows[k]) for k in range(len(rows))])
     # A robust limit, by the median and its deviations: the bad detections sought must not set it.
     limit = max(
@@ -150,6 +151,7 @@ def worst_frames(track: Path, eyes: int, fps: float, hints: Mapping[int, Points 
         if row["status"] == "lost":
             seen = hints.get(frame)
             if seen is not None and not isinstance(seen, str):
+                # Above every doubtful frame, which has 1e6 and its error.
                 ranked.append((2e6, frame, seen))
         else:
             error = float(row["error_px"] or 0.0)

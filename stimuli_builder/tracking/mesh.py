@@ -167,6 +167,7 @@ def _claim(owner: NDArray[np.int64], number: int, form: NDArray[np.float64], cor
     x0, y0 = np.floor(corners.min(0)).astype(int)
     x1, y1 = np.ceil(corners.max(0)).astype(int) + 1
     y, x = np.mgrid[y0:y1, x0:x1]
+    # A pixel on an edge belongs to a triangle in spite of rounding.
     inside = ((form[:, 0, None, None] * x + form[:, 1, None, None] * y + form[:, 2, None, None]) > -1e-9).all(
         0
     )
@@ -189,6 +190,7 @@ def reduce_picture(picture: Picture, factor: int) -> Picture:
 
 def reduced_points(points: Points, factor: int) -> Points:
     """Where points of the full picture (pixel centers at integers) lie in the reduced one."""
+    # Pixel centers lie at whole numbers, so that the picture begins at -1/2.
     return np.asarray((points + 0.5) / factor - 0.5)
 
 

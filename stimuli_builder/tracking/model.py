@@ -268,6 +268,7 @@ def _base(points: Points, options: TrainingOptions) -> tuple[BaseMesh, int, Poin
     full = np.array([with_border(frame) for frame in points])
     mesh = build_mesh(mean_shape(full), options.base_pixels)
     scales = [np.hypot(*similarity_between(mesh.vertices, shape)[:2]) for shape in full]
+    # Rounded down: the reduced picture stays at least as fine as the base mesh.
     reduction = max(1, int(np.mean(scales)))
     return mesh, reduction, reduced_points(full, reduction)
 
@@ -337,6 +338,7 @@ def _patches(
     spread = np.ptp(shapes[:, :, 1], axis=1) * 0 + (shapes - shapes.mean(1, keepdims=True)).reshape(
         len(shapes), -1
     ).var(1)
+    # Evenly over the ranks; where frames are few, a rank that comes twice counts once.
     chosen = np.argsort(spread)[
         np.unique(np.linspace(0, len(shapes) - 1, min(count, len(shapes))).astype(int))
     ]
@@ -346,6 +348,7 @@ def _patches(
     patches, corners = [], []
     for frame in chosen:
         corner = np.floor(shapes[frame].min(0)).astype(int) - 1
+        # Moved inward where the eyes are at the edge: all patches have one size.
         corner = np.clip(corner, 0, np.array([width, height]) - sides)
         patches.append(pictures[frame][corner[1] : corner[1] + sides[1], corner[0] : corner[0] + sides[0]])
         corners.append(corner)

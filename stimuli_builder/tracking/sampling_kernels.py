@@ -180,6 +180,7 @@ def grey_spreads(levels: NDArray[np.float32], ends: NDArray[np.int64], eyes: int
             total += part[x]
             squares += part[x] * part[x]
         mean = total / part.shape[0]
+        # A difference of two large numbers, which rounding may take below zero.
         spreads[eye] = math.sqrt(max(squares / part.shape[0] - mean * mean, 0.0))
         first = ends[eye]
     return spreads
