@@ -96,6 +96,7 @@ class BlinkModel:
             mean=mean,
             components=_signed(rows[:components]),
             coefficient_sd=np.sqrt(variance[:components]),
+            # Profiles that are all alike have no variance to share.
             explained=variance[:components] / max(variance.sum(), 1e-30),
             down_frames=down,
             up_frames=up,
@@ -233,12 +234,14 @@ def _normalised(profile: BlinkProfile, down_frames: int, up_frames: int, eyes: i
         if closure is None:
             raise InputError(f"profile {profile.profile_id} has one eye; this model needs both")
         parts.append(phase_spline(closure[profile.onset_index : middle + 1], down_frames))
+        # Both phases have the minimum: it is taken once.
         parts.append(phase_spline(closure[middle : profile.end_index + 1], up_frames)[1:])
     return np.concatenate(parts)
 
 
 def _energy_weight(form: Array, scales: Array) -> float:
     timing = float(scales.var(axis=0).sum())
+    # With a weight of 0 the scales could not be read back from a row.
     return 1.0 if timing < 1e-12 else float(np.sqrt(form.var(axis=0).sum() / timing)) or 1.0
 
 
@@ -329,11 +332,13 @@ def _apart(profile: BlinkProfile) -> tuple[Array, Array]:
     # Where 97% is crossed between samples.
     first = np.interp(TOP, share[top[0] - 1 : top[0] + 1], frames[top[0] - 1 : top[0] + 1]) if top[0] else 0.0
     last = float(top[-1])
+    # Turned round, since `np.interp` needs rising numbers and the share falls here.
     if top[-1] + 1 < closure.size:
         last = float(np.interp(TOP, share[top[-1] : top[-1] + 2][::-1], frames[top[-1] : top[-1] + 2][::-1]))
     ends = [(0.0, float(first)), (float(first), last), (last, float(closure.size - 1))]
     grid = np.linspace(0, 1, NODES)
     forms = [np.interp(start + grid * (end - start), frames, share) for start, end in ends]
+    # Not 0, since lengths are kept as logarithms.
     lengths = [max(end - start, 0.5) for start, end in ends]
     return np.array([*np.log(lengths), peak]), np.array(forms)
 
@@ -349,6 +354,7 @@ def _together(numbers: Array, forms: Array, profile_id: str) -> BlinkProfile:
     values = np.maximum(np.concatenate(list(forms)), 0.0)
     samples = np.interp(np.arange(int(np.ceil(starts[-1])) + 1), times, values)
     closure = np.round(np.clip(samples / samples.max() * peak, 0.0, 1.0), 9)
+    # Open at both ends, or the lid would jump where the blink meets the open eye.
     closure[0] = closure[-1] = 0.0
     minimum = int(closure.argmax())
     return with_minimum_at_peak(
@@ -467,6 +473,7 @@ def _rise(length_frames: int, handle: float | None) -> Array:
     # Bezier points (0, 0), (handle, 0), (1 - handle, 1), (1, 1): solve x(u) = time, then y(u).
     u = time.copy()
     low, high = np.zeros_like(time), np.ones_like(time)
+    # Sixty halvings are beyond the precision of a float64, whatever the handle.
     for _ in range(60):
         x = 3 * u * (1 - u) ** 2 * handle + 3 * u**2 * (1 - u) * (1 - handle) + u**3
         low, high = np.where(x < time, u, low), np.where(x < time, high, u)

@@ -214,6 +214,7 @@ def _not_sure(column: pd.Series, path: Path) -> NDArray[np.bool_]:
             f"{path.name}: column '{column.name}' must be between 0 and 1, got {np.nanmin(values):g} to "
             f"{np.nanmax(values):g}; rescale it, or rename the column"
         )
+    # Written so that a blank cell (NaN) counts as not sure.
     return np.asarray(~(values >= LEAST_CONFIDENCE))
 
 
@@ -396,6 +397,7 @@ def _frozen_runs(values: Array, fps: float) -> list[tuple[int, int]]:
     Only where the series has noise elsewhere; in a curve without noise a lid at rest repeats its value.
     """
     repeats = np.concatenate([[False], values[1:] == values[:-1]])
+    # Repeats begin one row after the value that they repeat.
     spans = [(a - 1, b) for a, b in runs(repeats) if b - a + 1 >= FROZEN_S * fps]
     elsewhere = np.isfinite(values)
     for start, stop in spans:

@@ -291,6 +291,7 @@ def lid_motion_at_300(
     reach = int(np.ceil(width_frames))
     first = max(0, onset - reach)
     part = place_mm[first : end + 1 + reach]
+    # Only the margin for the filter may have gaps: the blink itself is known.
     known = np.where(np.isfinite(part), part, place_mm[minimum])
     smooth = box_filter(known, width_frames)
     frames = np.arange(smooth.size)

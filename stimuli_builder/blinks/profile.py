@@ -126,7 +126,9 @@ def _checked_closure(profile_id: str, values: Array) -> Array:
     if not np.isfinite(closure).all() or closure.min() < -1e-9 or closure.max() > 1 + 1e-9:
         low, high = closure.min(), closure.max()
         raise InputError(f"profile {profile_id}: closure must be between 0 and 1, got {low:g} to {high:g}")
+    # What is left beyond 0 and 1 is rounding.
     closure = np.clip(closure, 0.0, 1.0)
+    # A frozen class does not keep its arrays from being changed in place.
     closure.setflags(write=False)
     return closure
 

@@ -103,6 +103,7 @@ def _timecode_s(column: pd.Series, path: Path) -> Array:
     steps, turns = np.diff(frames), np.diff(seconds)
     within, across = steps[turns == 0], turns == 1
     usual = float(np.median(within)) if within.size else 1.0
+    # Where a second turns, the count of frames falls by the base less a usual step.
     base = float(np.median(usual - steps[across])) if across.any() else float(frames.max() + usual)
     return np.asarray(seconds + frames / max(1.0, round(base)))
 
@@ -250,9 +251,11 @@ def resampled(
             f"{path.name}: time_s runs over {times[-1] - times[0]:,.0f} s, {count:,} frames at {fps:.4g} fps "
             f"but at most {MAX_FRAMES:,} are allowed. Cut the recording at the pause, or fix time_s"
         )
+    # Rounding may put the last frame beyond the last time, where nothing was measured.
     even = np.minimum(times[0] + np.arange(count) / fps, times[-1])
     left = np.clip(np.searchsorted(times, even, side="right") - 1, 0, steps.size - 1)
     away = np.minimum(even - times[left], times[left + 1] - even)
+    # Within half a frame of a true time a frame is that time's, at the edge of a hole as well.
     in_hole = _is_hole(steps)[left] & (away > 0.5 / fps)
     data: dict[str, Array | pd.Series] = {"frame": np.arange(count, dtype=np.float64), "time_s": even}
     for column in columns:
@@ -295,5 +298,6 @@ def bridge_gaps(values: Array, most_frames: int) -> tuple[Array, int]:
 
 def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return the (start, stop) of every run of True."""
+    # With a zero at either end, so that runs which reach it have two edges too.
     edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
     return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))

@@ -160,6 +160,7 @@ def closure_course(series: BlinkSeries, closed_distance: float) -> Array:
     known = np.isfinite(series.distance)
     opening = np.full(known.size, np.nan)
     opening[known] = local_opening(series.distance[known], series.fps)
+    # An opening that falls to the closed distance would divide by zero.
     span = np.maximum(opening - closed_distance, 1e-9)
     return np.clip((opening - series.distance) / span, 0.0, 1.0)
 

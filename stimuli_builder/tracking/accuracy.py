@@ -79,6 +79,7 @@ def cross_validate(
     folds = min(folds, len(frames))
     results = []
     for fold in range(folds):
+        # Interleaved, so that every fold has frames from all over the recording.
         out = [frame for index, frame in enumerate(frames) if index % folds == fold]
         kept = [frame for frame in frames if frame not in out]
         labels = {frame: points[frame] for frame in kept}

@@ -37,6 +37,7 @@ class Finder:
             (number, scale, cv2.resize(reduce_picture(patch, self._factor), None, fx=scale, fy=scale))
             for number, patch in enumerate(model.patches)
             for scale in SCALES
+            # A patch of fewer than four reduced pixels resembles anything.
             if min(height, width) * scale >= 4 * self._factor
         ]
 
@@ -63,6 +64,7 @@ class Finder:
                 continue
             # Normalized by mean and contrast, as the light may have changed since the labeled frames.
             _, match, _, corner_px = cv2.minMaxLoc(cv2.matchTemplate(small, template, cv2.TM_CCOEFF_NORMED))
+            # A flat part of the picture has no contrast to divide by.
             if np.isfinite(match) and match > LEAST_MATCH:
                 matches.append((match, number, scale, corner_px))
         matches.sort(key=lambda entry: -entry[0])

@@ -36,6 +36,7 @@ def accumulate(error, gx, gy, triangles, starts, forms, px, py, out):
             sy += ey
             syx += ey * xs[i]
             syy += ey * ys[i]
+        # The forms are linear in (x, y, 1), so that three sums per axis replace the triangle's pixels.
         for k in range(3):
             v = triangles[t, k]
             out[v, 0] += forms[t, k, 0] * sxx + forms[t, k, 1] * sxy + forms[t, k, 2] * sx

@@ -104,6 +104,7 @@ class Hindsight:
 
     def _released(self) -> TrackedFrame:
         frame = self._held.popleft()
+        # Two windows: a frame is judged by the repeats before it and by those after it.
         oldest = self._count - 2 * self._window
         while self._repeats and self._repeats[0] < oldest:
             self._repeats.popleft()

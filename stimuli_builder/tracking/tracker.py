@@ -301,6 +301,7 @@ class Tracker:
         if self._picture is not None:
             # As recorded: evened light would move what is saturated.
             hidden, glare = self._glare.of(fit, self._picture)
+            # In quadrature, as of independent errors; every point of an eye gets that eye's share.
             errors = np.hypot(errors, widths(points) * np.repeat(hidden, EYE_POINTS))
             why = why or glare or glare_hides(errors, widths(points))
         return points, errors, why
