@@ -50,8 +50,9 @@ class Geometry:
         if after and (first * scale < top or after * scale > top + height_px):
             raise InputError(
                 f"a picture of {width_px} x {height_px} px cuts off moving parts of a blink of "
-                f"'{self.name}', which is {whole[1]} px high at that width. Use a larger height (its own "
-                f"size: width_px = {self.size_px[0]}, height_px = {self.size_px[1]})"
+                f"'{self.name}', which is {whole[1]} px high at that width. Use a larger height, such as its "
+                f"own size: --size {self.size_px[0]}x{self.size_px[1]}, or width_px = {self.size_px[0]}, "
+                f"height_px = {self.size_px[1]}"
             )
         return whole, top
 

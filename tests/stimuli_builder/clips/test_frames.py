@@ -142,7 +142,7 @@ def test_other_sizes_are_resampled_with_still_edges(
     [
         ((48, 40), "24 px high"),
         ((48, 10), "cuts off moving parts of a blink of 'tiny', which is 24 px high"),
-        ((48, 10), "its own size: width_px = 48, height_px = 24"),
+        ((48, 10), "its own size: --size 48x24, or width_px = 48, height_px = 24"),
     ],
 )
 def test_a_size_that_cannot_show_the_blink_is_refused(
