@@ -155,6 +155,7 @@ def _refuse_unrated(rows: pd.DataFrame, factor: str, unrated: set[str], source: 
 def _check_scale(scale: RatedScale, rows: pd.DataFrame, source: str) -> None:
     given = rows["response"].to_numpy()
     steps = (given - scale.minimum) / scale.step
+    # Within a tolerance, since steps such as 0.1 are not exact in binary.
     off = (given < scale.minimum) | (given > scale.maximum) | (np.abs(steps - np.round(steps)) > 1e-6)
     if off.any():  # an empty answer is off nothing: comparisons with NaN are false
         at = int(np.argmax(off))
@@ -270,6 +271,7 @@ def scale_cases(prepared: PlanRows, scales: Sequence[RatedScale]) -> pd.DataFram
 
 
 def cronbach_alpha(cases: pd.DataFrame) -> dict[str, Any] | None:
+    # Tables of other programs have no number of a trial: the cell takes its place.
     """Alpha with its 95% interval (Feldt), by pingouin; None where a scale does not vary."""
     # pingouin takes seconds to import, which one scale need not pay
     from pingouin import cronbach_alpha as alpha_of

@@ -82,6 +82,7 @@ class RuleVerdicts:
         reasons: dict[str, list[str]] = {}
         for run, why in (*self.by_hand, *(said for rule in at for said in self.runs[rule])):
             reasons.setdefault(run, []).append(why)
+        # After the other rules: where one of them excludes a first run, the second counts as the first.
         _later_runs(self.people, reasons, self.first_seen)
         excluded = tuple(
             ExcludedRun(str(self.people[run]), str(run), tuple(reasons[run]))
@@ -99,6 +100,7 @@ class RuleVerdicts:
                 runs = int(self.main["run"][bad].nunique())
                 dropped.append(DroppedTrials(self.rules[rule].rule, n_plays(self.main[bad]), runs))
             kept &= ~marked
+        # Rules about participants first, then those about trials, in the order of their use.
         order = sorted(at, key=lambda rule: isinstance(self.rules[rule], LeavesOutTrials))
         missing = tuple(self.lacking[rule] for rule in order if self.lacking[rule])
         n_runs = len(self.people)

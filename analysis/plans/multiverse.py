@@ -137,6 +137,7 @@ class _Choice:
     def __init__(self, prepared: PlanRows, analyse: Analyse) -> None:
         self._prepared, self._analyse = prepared, analyse
         whole = judge_rows(prepared.experiment, prepared.checked)
+        # Numbered from 0: the index then says which rows a choice keeps.
         self._judged = replace(whole, main=whole.main.reset_index(drop=True))
         self._known: dict[bytes, tuple[AnovaResult, int] | InputError] = {}
 

@@ -51,6 +51,7 @@ def _in_labels(note: str, result: "MixedResult | OrdinalResult", labels: Labels)
     }
     for effect in result.effects:
         said |= {f"{word} of {effect.effect}": f"{word} of {labels.term(effect.effect)}" for word in _SLOPES}
+    # The longest phrase first, or one that begins another would be replaced within it.
     phrases = "|".join(sorted(map(re.escape, said), key=len, reverse=True))
     return re.sub(rf"(?<![\w:])(?:{phrases})(?!\w|:\w)", lambda one: said[one[0]], note)
 
@@ -90,6 +91,7 @@ def fit_with_random(
                 **chosen, random=random, slopes="all" if every else "main", random_slopes=slopes
             )
         except (InputError, np.linalg.LinAlgError):
+            # More slopes than the data determine: the next fewer are tried.
             continue
         return fitted, slopes
     return fit_mixed(**arguments, random=random, slopes="all" if every else "main"), "none"

@@ -190,6 +190,7 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             axes.plot(people, values[:, :, shade].T, color=colour, alpha=0.12, linewidth=0.5, zorder=1)
         for group in range(n_groups):
             if spec.style == "points":
+                # Participants of other groups are NaN here.
                 there = values[~np.isnan(values[:, group, shade]), group, shade]
                 _cloud(axes, at[group] + 0.06 * room, there, 0.38 * room, colour)
             axes.plot(
@@ -227,6 +228,7 @@ def _cloud(axes: Axes, x: float, values: Floats, width: float, colour: str) -> N
         return
     heights = np.linspace(values.min(), values.max(), _CLOUD_STEPS)
     density = _density(values, heights)
+    # Scaled to the widest place: the width of a cloud says nothing of how many it has.
     reach = x + width * density / density.max()
     axes.fill_betweenx(heights, x, reach, color=colour, alpha=0.13, linewidth=0, zorder=0)
 
@@ -291,6 +293,7 @@ def _name(analysis: Analysis, levels: dict[str, str]) -> str:
 
 def _jitter(n: int) -> Floats:
     """Evenly spread offsets in [-1, 1] in an order that looks random and is not."""
+    # Steps of the golden ratio fill an interval evenly at any number.
     golden = np.arange(1, n + 1) * 0.6180339887498949
     spread: Floats = 2 * (golden - np.floor(golden)) - 1
     return spread
@@ -564,6 +567,7 @@ def _tests(axes: Axes, p: np.ndarray, names: list[str]) -> None:
     for i, name in enumerate(names):
         axes.plot(
             columns,
+            # On a logarithmic axis a p of 0 has no place.
             np.maximum(p[:, i], SMALLEST_P),
             color=COLOURS[i % len(COLOURS)],
             marker=MARKERS[i % len(MARKERS)],
@@ -585,6 +589,7 @@ def _rules(axes: Axes, applied: np.ndarray, names: list[str]) -> None:
     column, rule = np.nonzero(applied)
     axes.plot(column, rule, linestyle="none", marker="o", markersize=3.5, color="#333333")
     axes.set_yticks(range(len(names)), names, fontsize=7)
+    # The first rule on top.
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.set_xticks([])
     axes.spines["bottom"].set_visible(False)

@@ -104,6 +104,7 @@ def as_markdown(table: Table) -> str:
 
 
 def _markdown_cell(cell: str) -> str:
+    # The backslash first, or it would escape those that are added after it.
     return cell.replace("\\", "\\\\").replace("|", "\\|").replace("<", "\\<")
 
 

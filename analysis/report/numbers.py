@@ -16,6 +16,7 @@ def fixed(value: float, digits: int = 2) -> str:
     if not math.isfinite(value):
         return DASH
     text = f"{value:.{digits}f}"
+    # A small negative number may round to -0.00.
     return text.lstrip("-") if float(text) == 0 else text
 
 

@@ -144,6 +144,7 @@ def wrap_text(text: str, characters: int) -> str:
 def write_note(figure: Figure, note: str, synthetic: bool, what: str = "ratings") -> None:
     """A note below the figure, under a mark where no person gave the data."""
     mark = f"SYNTHETIC DATA: no person gave these {what}.\n" if synthetic else ""
+    # Lines by characters, since the width of a text is known only when it is drawn.
     note = wrap_text(note, int(NOTE_CHARACTERS * figure.get_figwidth()))
     figure.supxlabel(mark + note, fontsize=7, color="#8a1c1c" if synthetic else "#555555")
 
@@ -156,6 +157,7 @@ def in_both_formats(figure: Figure) -> tuple[bytes, bytes]:
     svg, png, dpi = BytesIO(), BytesIO(), figure.dpi
     with mpl.rc_context(STYLE), further_letters(figure):
         _drawn(FigureCanvasSVG(figure).print_svg, svg, {"Date": None, "Creator": None})
+        # The layout of the first drawing holds for the second.
         figure.set_layout_engine("none")
         figure.dpi = dpi  # an SVG has 72
         _drawn(FigureCanvasAgg(figure).print_png, png, {"Software": None})

@@ -140,6 +140,7 @@ def prints_as(value: float, printed: str) -> bool:
     if printed[0] in "<>":
         low, high = window(printed)
         return low < value < high
+    # As texts, since decimals such as 4.85 are not exact in binary.
     return f"{value:.{decimals(printed)}f}" == f"{float(printed):.{decimals(printed)}f}"
 
 

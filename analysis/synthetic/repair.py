@@ -18,6 +18,7 @@ def test_value(y: Floats, contrasts: Floats) -> float:
     n, q = y.shape[0], contrasts.shape[1]
     z = y @ contrasts
     mean = z.mean(axis=0)
+    # From products that hold the mean as well: P / (1 - P) is Hotelling's trace.
     pillai = n * float(mean @ np.linalg.solve(z.T @ z, mean))
     return float(pillai / (1 - pillai) * (n - q) / q)
 
@@ -55,6 +56,7 @@ AIM = 0.5
 
 
 def _aimed(low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    # An open window has no inner share: infinity less infinity is computed and not used.
     with np.errstate(invalid="ignore"):
         inner = np.where(np.isfinite(low) & np.isfinite(high), (1 - AIM) / 2 * (high - low), 0.0)
     return low + inner, high - inner
@@ -192,6 +194,7 @@ class _Search:
 
     def losses(self) -> Floats:
         loss = self.loss_of.after_moves(self.sums / self.trials, self.signs / self.trials)
+        # A move off the scale is never the best.
         loss[0][self.sums >= self.high] = np.inf
         loss[1][self.sums <= self.low] = np.inf
         return loss
@@ -264,6 +267,7 @@ def repair(
             stalled = stalled + 1 if now == before else 0
             if stalled == STALLS:
                 search.kick()
+                # After a kick every loss is progress, else the search would go straight back.
                 now, stalled = np.inf, 0
         missed = missed_targets(search.sums / trials, targets)
         if progress is not None:

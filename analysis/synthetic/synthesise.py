@@ -135,6 +135,7 @@ def _covariance(
         together -= together.mean()
     ones = np.sqrt(k) * flat[:, 0]
     full = grand * np.outer(ones, ones) + np.outer(ones, together) + np.outer(together, ones) + effects
+    # Printed figures may ask for a covariance that cannot be: what is negative in it is cut.
     values, vectors = np.linalg.eigh(full)
     return np.asarray((vectors * np.maximum(values, 1e-6)) @ vectors.T, dtype=np.float64)
 
@@ -147,6 +148,7 @@ def draw(population: Population, n: int, rng: np.random.Generator, exact: bool) 
     k = len(population.means)
     noise = rng.normal(size=(n, k))
     if exact and n > k:
+        # Orthonormal columns with a mean of 0 give the sample exactly the population's covariance.
         noise -= noise.mean(axis=0)
         noise = np.linalg.qr(noise)[0] * np.sqrt(n - 1)
     values, vectors = np.linalg.eigh(population.covariance)

@@ -120,6 +120,7 @@ def test_target(test: PrintedTest, space: DesignSpace, n: int) -> TestTarget:
     low, high, scale = 0.0, np.inf, 1.0
     if test.p is not None:
         p_low, p_high = window(test.p)
+        # A little inside the bounds, so that p rounds as printed in spite of its last digits.
         low = float(stats.f.isf(min(p_high, 1.0), q, n - q)) * (1 + 1e-4)
         high = float(stats.f.isf(p_low, q, n - q)) * (1 - 1e-4) if p_low > 0 else np.inf
         scale = 0.1
@@ -267,6 +268,7 @@ def _possible(means: tuple[PrintedMean, ...], space: DesignSpace) -> bool:
     rows = np.stack([space.weights(m.at) for m in means])
     low, high = np.array([window(m.printed) for m in means]).T
     half = (high - low)[:, None] / 2
+    # At a slack of 1 every mean lies in the middle of its window: more is not possible.
     bounds = [(None, None)] * space.n_cells + [(None, 1.0)]
     solution = linprog(
         np.r_[np.zeros(space.n_cells), -1.0],

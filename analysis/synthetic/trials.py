@@ -42,6 +42,7 @@ def split_sum(
     """Draw len(means) whole ratings in [low, high] around `means` that add up to `total`."""
     sd = TRIAL_SD * (high - low) / WIDTH
     ratings = np.clip(np.rint(means + rng.normal(size=len(means)) * sd), low, high).astype(np.int64)
+    # Repeated, since near an end of the scale fewer ratings can move than points are missing.
     while (gap := total - int(ratings.sum())) != 0:
         movable = np.flatnonzero(ratings < high if gap > 0 else ratings > low)
         chosen = rng.permutation(movable)[: abs(gap)]

@@ -81,8 +81,10 @@ class ClipHashes:
                 hashed.update(piece)
                 length += len(piece)
         except Exception:
+            # Nothing is kept: the next answer that needs this clip asks again.
             return
         with self._lock:
+            # A clip that was read in part has another hash.
             if length == size and len(self._hashes) < MAX_HASHES:
                 self._hashes[sha256] = hashed.digest()
 

@@ -249,6 +249,7 @@ _JUDGE = Prepared(
         _evidence.c.study_run_id == bindparam("run"),
         _evidence.c.trial_index == bindparam("trial"),
         _evidence.c.play == bindparam("of_play"),
+        # Only where nothing was said yet: of two workers that judge at once, the first counts.
         _evidence.c.digest_right.is_(None),
     )
     .values(digest_right=bindparam("right"))

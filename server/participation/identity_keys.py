@@ -83,6 +83,7 @@ def seal(secret: bytes, run: str, known_as: ParticipantIdentity) -> Sealed:
     """Encrypt under a new key; `secret` is the installation's key, `run` the run's public id."""
     key, nonce = AESGCM.generate_key(KEY_BYTES * 8), os.urandom(NONCE_BYTES)
     plain = json.dumps({"identifier": known_as.identifier, "parameters": dict(known_as.parameters)})
+    # The run is associated data: content that is moved to another run's row does not open.
     content = nonce + AESGCM(key).encrypt(nonce, plain.encode(), run.encode())
     return Sealed(_text(content), wrap(secret, key))
 

@@ -112,6 +112,7 @@ def readable_identities(session: Session) -> Iterator[bool]:
     query = (
         select(StudyRun.public_id, RecruiterIdentity.sealed, IdentityKey.wrapped_key)
         .join(StudyRun, StudyRun.id == RecruiterIdentity.study_run_id)
+        # Outer: an id whose key is gone counts as one that cannot be read.
         .outerjoin(IdentityKey, IdentityKey.study_run_id == RecruiterIdentity.study_run_id)
         .where(RecruiterIdentity.sealed != "")
     )

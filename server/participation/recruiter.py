@@ -189,7 +189,9 @@ def without_refused(recruiter: Recruiter, stored: Mapping[str, Any] | None = Non
 
 
 def _filled_in(address: str, code: str, run: str, parameters: Mapping[str, str]) -> str | None:
+    # The run's values last: a parameter that is called code must not take the code's place.
     for name, value in {**parameters, "code": code, "run": run}.items():
+        # Wholly quoted: what an address says of a person must not add a parameter or a path.
         address = address.replace("{" + name + "}", quote(value, safe=""))
     return address or None
 

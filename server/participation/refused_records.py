@@ -106,6 +106,7 @@ def _check_answer(
         answered_at=None,
         evidence=_evidence(record.body),
     )
+    # Its clips take their time although nothing is stored: a page must not gain time by refusals.
     tally.clip_time = intake.take(connection, answer, tally.clip_time, stores=False)
     rating_repository.keep_tally(connection, run.id, tally, is_new=trial.tally is None)
     return trial.kind
@@ -116,6 +117,7 @@ def _evidence(body: dict[str, Any]) -> RatingEvidence | None:
     if not isinstance(sent, dict):
         return None
     try:
+        # Without the presses: a fault in them must not hide a good ticket.
         return RatingEvidence.model_validate({**sent, "interaction": None})
     except ValidationError:
         return None
@@ -125,6 +127,7 @@ def _kept_record(record: RefusedRecord, which: tuple[int, int] | None, *, whole:
     """What is stored: the reason and the record, without what would not fit."""
     body = _storable_value({key: value for key, value in record.body.items() if key != "evidence"})
     if _size(body) > KEPT_BYTES and isinstance(body.get("playback"), dict):
+        # The log of drawn frames goes first, as the longest part of a record.
         body["playback"] = {key: value for key, value in body["playback"].items() if key != "drawn"}
     if _size(body) > KEPT_BYTES or not whole:
         body = {"left_out_bytes": _size(body)}

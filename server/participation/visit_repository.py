@@ -96,6 +96,7 @@ def page_of_runs(
     query = query.options(
         joinedload(StudyRun.link), joinedload(StudyRun.version).load_only(StudyVersion.number)
     )
+    # By number and not by offset: runs that begin meanwhile move no page.
     return list(session.scalars(query if before is None else query.where(StudyRun.id < before)))
 
 

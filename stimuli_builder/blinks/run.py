@@ -321,6 +321,7 @@ def _write(job: BlinksJob, labelled: _LabelledRecording) -> list[Path | None]:
     events = job.events if job.classify else None
     if events is not None:
         write_events(events, labelled.eyes)
+    # The table of blinks last: where it is new, everything else is written.
     write_blinks(job.out, labelled.frame)
     aligned = job.plot_aligned if labelled.profiles else None
     return [job.out, job.profiles, events, *job.more.paths, job.summary, job.plot, aligned]

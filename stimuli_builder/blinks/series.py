@@ -62,6 +62,7 @@ def tracked_lower_lid(table: pd.DataFrame, column: str) -> tuple[Array, Array] |
     axis = np.median(points[known, _INNER_CANTHUS] - points[known, _OUTER_CANTHUS], axis=0)
     length_px = float(np.hypot(*axis))
     nasal = axis / max(length_px, 1e-9)
+    # Square to the axis; which of both directions is up depends on the side of the nose.
     upwards = np.array([nasal[1], -nasal[0]]) * (1.0 if nasal[0] >= 0 else -1.0)
     lid_mm = points[:, _LOWER_LID].mean(axis=1) * FISSURE_LENGTH_MM / max(length_px, 1e-9)
     up_mm, nasal_mm = lid_mm @ upwards, lid_mm @ nasal
@@ -129,6 +130,7 @@ def box_filter(values: Array, width_frames: float) -> Array:
     reach = int(np.ceil((width_frames - 1) / 2))
     if reach <= 0:
         return values.copy()
+    # The part of each outermost sample that the window covers.
     edge = (width_frames - (2 * reach - 1)) / 2
     kernel = np.ones(2 * reach + 1)
     kernel[0] = kernel[-1] = edge

@@ -92,6 +92,7 @@ def build(
         removed = stale(former, manifest)
         if former != manifest:
             write_bytes(folder / MANIFEST_NAME, manifest_text(manifest).encode())
+    # After the new manifest: an interruption must not leave one whose files are gone.
     for name in removed:
         (folder / name).unlink(missing_ok=True)
     checks.finish_checks(folder, state)
@@ -101,6 +102,7 @@ def build(
 
 def _missing(planned: list[PlannedClip], state: BuildState) -> list[PlannedClip]:
     """The clips to render, each input once."""
+    # Turned round twice: of clips with one input the first of the design stays, in its place.
     by_hash = {clip.job.input_hash: clip for clip in reversed(planned)}
     return [clip for key, clip in reversed(by_hash.items()) if not state.intact(key)]
 

@@ -134,6 +134,7 @@ def _read_resized(character: Atlas, scaled: tuple[int, int], shown: slice, windo
     frame = character.base_linear()
     levels = np.empty((len(character.closures), window.height, window.width, 3), np.uint16)
     for index in range(len(levels)):
+        # The whole frame each time: a crop scaled by itself would end otherwise at its edges.
         frame[character.crop] = srgb_to_linear(character.level_srgb(index))
         scaled_frame = _resized(frame, scaled)[shown]
         levels[index] = quantise_light(scaled_frame[window.slices])
@@ -163,6 +164,7 @@ def _scaled_lower_lid(
 def _resized(frame: NDArray[np.float32], size_px: tuple[int, int]) -> NDArray[np.float32]:
     if (frame.shape[1], frame.shape[0]) == size_px:
         return frame
+    # Means over areas where it shrinks, since an interpolation would pass over pixels.
     method = cv2.INTER_AREA if size_px[0] < frame.shape[1] else cv2.INTER_LANCZOS4
     return np.asarray(cv2.resize(frame, size_px, interpolation=method), np.float32)
 

@@ -46,8 +46,10 @@ def frame_windows(sample_count: int, fps: float, blur: bool) -> Iterator[tuple[N
         )
     for start in np.arange(frames) * step:
         if not blur:
+            # A sample's number may come out a rounding error short as well.
             yield np.array([int(start + step / 2 + 1e-9)]), np.ones(1)
             continue
+        # One sample more than may be needed: those without a share are left out below.
         sample = np.arange(int(start), min(sample_count, int(np.ceil(start + step)) + 1))
         # How much of each sample's own time, one 300th of a second, lies within the frame's.
         covered = np.clip(np.minimum(start + step, sample + 1) - np.maximum(start, sample), 0.0, 1.0)
@@ -179,6 +181,7 @@ def clip_curve(
     step = samples_per_frame(timing.fps)
     onset = round(timing.lead_in_frames * step) + timing.phase_samples
     end = onset + len(profile.closure)
+    # A whole number of frames may come out a rounding error long.
     frames = clip_frames or int(np.ceil(end / step - 1e-9)) + timing.lead_out_frames
     total = int(np.ceil(frames * step - 1e-9))
     if end > total:

@@ -129,6 +129,7 @@ def _timer(length_s: float, mean_s: float, rng: np.random.Generator) -> list[flo
     """Blinks of a timer that runs already when the clip begins: in a long wait rather than a short one."""
     shortest, longest = (share * mean_s for share in TIMER_SHARES)
     times: list[float] = []
+    # An interval is met in proportion to its length: its density is 2 t / (longest^2 - shortest^2).
     under_way = float(np.sqrt(rng.uniform(shortest**2, longest**2)))
     time_s = float(rng.uniform(0.0, under_way))
     while time_s < length_s:
@@ -215,6 +216,7 @@ def planned_clips(experiment: Experiment, options: Options) -> list[PlannedClip]
 def check_levels(experiment: Experiment) -> None:
     """InputError where two levels of a factor render alike: their clips would be the same blinks."""
     for factor in experiment.factors:
+        # Every level of such a factor has other blinks, so that equal rendering still gives other clips.
         if factor.name in experiment.exemplars.own_per:
             continue
         for number, level in enumerate(factor.levels):

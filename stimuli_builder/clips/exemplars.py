@@ -148,6 +148,7 @@ def exemplar(
         profile = replace(profile, closure_other=None)
     # As many onsets as samples begin within one frame: 10 at 30 fps, 12 at 24 and 25, 6 at 50, 5 at 60.
     phases = generator("phase", seed, family).permutation(int(samples_per_frame(settings.fps)))
+    # In turn: every onset comes once before any comes twice.
     phase = int(phases[(number - 1) % len(phases)])
     return Exemplar(amplitude_of(profile, settings.amplitude), repeated, phase)
 

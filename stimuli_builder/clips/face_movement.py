@@ -135,6 +135,7 @@ class Fissures:
             # Nearer to the shut picture than to the open one: no threshold that would hang on skin or
             # light.
             looks_shut = ((picture - opened) ** 2).sum(2) > ((picture - shut) ** 2).sum(2)
+            # The first level that looks shut decides: later ones must not replace it.
             covered[looks_shut & np.isnan(covered)] = character.closures[index]
         return cls(character, opening_mm, covered, ((opened - shut) ** 2).sum(2) > _CLEAR)
 
@@ -215,6 +216,7 @@ def moved_levels(character: LevelSet, geometry: Geometry, movement: Movement) ->
     window = _window_of(character, skin)
     first = character.window.y - window.y, character.window.x - window.x
     levels = np.empty((len(character.levels), window.height, window.width, 3), np.uint16)
+    # Where the window grows, pixels that no blink changes show the base at every level.
     levels[:] = character.base[window.slices]
     inside = tuple(slice(at, at + n) for at, n in zip(first, character.levels.shape[1:3], strict=True))
     levels[:, *inside] = character.levels
@@ -262,6 +264,7 @@ def _skin_shift(character: LevelSet, eyes: list[_Eye], added: Mapping[str, float
             if part in fields:
                 px = mm * character.px_per_mm * fields[part].share(x, y)
                 shift[..., 0] += px * fields[part].direction[0] * eye.outwards
+                # Rows grow downwards, y upwards.
                 shift[..., 1] -= px * fields[part].direction[1]
     return shift
 
@@ -359,6 +362,7 @@ def kept_levels(
     # Every core is already used by a separate process.
     cv2.setNumThreads(1)
     if size_px[0] > ROOMY_WIDTH_PX:
+        # Cleared before the next is read: two of this size at once would take too much memory.
         kept_levels.cache_clear()
     shown = find_character(character, beside)
     return moved_levels(shown.levels(size_px), shown.geometry, movement)

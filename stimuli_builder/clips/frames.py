@@ -108,6 +108,7 @@ class FramePainter:
         character, window = self.character, self.character.window
         width, height = character.size_px
         planes = self._base.copy()
+        # Nothing moves: the base is converted already.
         if not np.any(curve.motion(samples)):
             return planes
         luma, blue, red = split_planes(planes, width, height)

@@ -45,6 +45,7 @@ class Geometry:
                 f"character '{self.name}' is {whole[1]} px high at a width of {width_px} px; expected a "
                 f"height of at most that, got {height_px}"
             )
+        # Even, since one row of chroma covers two rows of luma.
         top, scale = 2 * (spare // 4), width_px / self.size_px[0]
         first, after = self.blink_rows
         if after and (first * scale < top or after * scale > top + height_px):

@@ -94,6 +94,7 @@ class ClipJob:
         curve = self.curve
         for name in ("closure", "closure_other", "lower_vertical_mm", "lower_horizontal_mm"):
             values = getattr(curve, name)
+            # The name as well: a signal that is absent must not hash like another that has its values.
             digest.update(name.encode())
             if values is not None:
                 # Whole millionths: the same on every machine, whatever its last bits of rounding.
@@ -261,6 +262,7 @@ def _on_dask(jobs: Sequence[ClipJob], order: list[int], address: str) -> Iterato
         for future in completed(list(futures), loop=client.loop):
             index = futures.pop(future)
             content = future.result()
+            # Released at once, or the scheduler would hold every clip until the end.
             future.release()
             yield index, content
 

@@ -95,6 +95,7 @@ def to_yuv(
         if side == 1:
             for i in range(width // 2):
                 x = 2 * i
+                # At the picture's edge the column itself takes the place of its left neighbor.
                 left, right = max(x - 1, 0), x + 1
                 mean_blue = (
                     row_blue[0, left]

@@ -85,6 +85,7 @@ class LowerLid:
 
     def thinned(self, step: int) -> "LowerLid":
         """Every `step`th pixel both ways, counted from the window's first."""
+        # The first pixel of the layer that lies on the grid of the window.
         first = [-part.start % step for part in (self.rows, self.columns)]
         inside = slice(first[0], None, step), slice(first[1], None, step)
         changes = np.ascontiguousarray(self.changes[:, *inside])
@@ -223,4 +224,5 @@ def window_inside(x: float, y: float, width: float, height: float, size_px: tupl
 
 def quantise_light(light: NDArray[np.float32]) -> Light:
     """16-bit code of linear light in 0-1, clipped."""
+    # Half a step more, since the conversion to whole numbers cuts.
     return (np.clip(light, 0.0, 1.0) * np.float32(FULL_SCALE) + np.float32(0.5)).astype(np.uint16)

@@ -162,6 +162,7 @@ class EyeRegions:
             radius = PUPIL_MM * self.px_per_mm
             # Strongest at the rim of the pupil, nothing at the center and beyond the iris.
             share = np.exp(-((np.hypot(across, down) / radius - 1.0) ** 2) * 4.0)
+            # At the center itself there is no direction.
             field += radius * share * np.stack((across, down)) / np.maximum(np.hypot(across, down), 1e-3)
         return field[0], field[1]
 
@@ -191,6 +192,7 @@ class EyeRegions:
         inside = (smooth > 0.25 * smooth.max()).astype(np.float32)
         gaze = cv2.GaussianBlur(inside, (0, 0), 0.8 * px_per_mm)
         dark = cv2.GaussianBlur(opened.astype(np.float32), (0, 0), 1.2 * px_per_mm)
+        # Within the openings alone: hair and brows may be darker than a pupil.
         dark = np.where(inside > 0, dark, np.inf)
         middle = opened.shape[1] // 2
         pupils = []
@@ -261,6 +263,7 @@ def moments_of(
 
 def noise_of(life: Life, number: int, shape: tuple[int, int]) -> NDArray[np.float32]:
     """Sensor noise of a frame's luma, in 8-bit steps."""
+    # By the frame's number: the noise does not depend on which frames were painted before.
     rng = np.random.default_rng((life.noise_seed, number))
     return rng.standard_normal(shape, np.float32) * np.float32(life.noise_codes)
 
@@ -275,5 +278,6 @@ def following_lids(closure: Array, life: Life, opening_mm: float) -> Array:
     opening_mm : float
         Height of the open eye.
     """
+    # An eye that looks up would lift the lid beyond the open picture, which no level shows.
     down = np.maximum(life.gaze_mm[:, 1], 0.0) / opening_mm
     return np.asarray(np.round(np.clip(closure + (1.0 - closure) * down, 0.0, 1.0), DECIMALS))

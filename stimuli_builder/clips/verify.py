@@ -81,6 +81,7 @@ class OpeningMeter:
 
     def measured_mm(self, luma: NDArray[np.uint8]) -> Array:
         """(frames, eyes) opening in mm in pictures of (frames, height, width) limited-range luma."""
+        # Limited range, 16 to 235, to 0-1.
         pictures = (luma[:, *self._pixels].astype(np.float64) - 16) / 219
         return self._opening([[eye.project(picture) for eye in self._eyes] for picture in pictures])
 
@@ -312,6 +313,7 @@ def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None, *, 
         fits = (stream.width, stream.height) == (clip.width_px, clip.height_px)
         for frame in container.decode(stream):
             times.append(None if frame.pts is None else frame.pts * frame.time_base)
+            # Only the first and the last picture: all of a clip would fill the memory.
             ends = [*ends[:1], frame]
             if meter is not None and fits:
                 luma = frame.to_ndarray(format="yuv420p")[: frame.height]
