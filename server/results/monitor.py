@@ -44,6 +44,7 @@ def snapshot(
     active = monitor_repository.under_way(session, study, origin, moment - lease)
     recent = monitor_repository.completed_since(session, study, origin, moment - PACE_OVER)
     runs = monitor_repository.latest_runs(session, study, origin, MAX_LISTED)
+    main = monitor_repository.main_trials(session, runs)
     return MonitorSnapshot(
         study=study.name,
         study_status=study.status,
@@ -61,7 +62,7 @@ def snapshot(
         funnel=funnel(counted),
         expected_finish=expected_finish(by_status["complete"], *recent, study.quota, moment),
         total=sum(kind.runs for kind in counted),
-        runs=[monitored_run(run, moment, lease) for run in runs],
+        runs=[monitored_run(run, main[run.id], moment, lease) for run in runs],
     )
 
 
@@ -88,8 +89,8 @@ def group_counts(
     ]
 
 
-def monitored_run(run: Any, moment: datetime, lease: timedelta) -> MonitoredRun:
-    """One line of the monitor's table."""
+def monitored_run(run: Any, main: Sequence[int], moment: datetime, lease: timedelta) -> MonitoredRun:
+    """One line of the monitor's table; the study counts the trials `main` alone."""
     letters = run.heat.ljust(run.trials_total, ".")[: run.trials_total]
     silent = moment - run.last_seen_at
     if run.status != "active":
@@ -111,6 +112,8 @@ def monitored_run(run: Any, moment: datetime, lease: timedelta) -> MonitoredRun:
             "last_seen_at": run.last_seen_at,
             "answered": len(letters) - letters.count("."),
             "trials": run.trials_total,
+            "main_answered": sum(letters[trial] != NOT_MET for trial in main),
+            "main_trials": len(main),
             "uncertain": letters.count("u"),
             "flagged": letters.count("f"),
             "failed": letters.count("x"),

@@ -5,13 +5,24 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from sqlalchemy import func, select
+from sqlalchemy import func, literal_column, select
 from sqlalchemy.orm import Session
 
-from server.models import Link, Rating, RunEvent, RunTally, Study, StudyRun, TrialClip, VersionClip
+from server.models import (
+    AssignedTrial,
+    Link,
+    Rating,
+    RunEvent,
+    RunTally,
+    Study,
+    StudyRun,
+    TrialClip,
+    VersionClip,
+)
 
 # Whole objects would take several times as long: this is asked every two seconds, of hundreds of runs.
 SHOWN = (
+    StudyRun.id,
     StudyRun.public_id,
     StudyRun.participant,
     StudyRun.phase,
@@ -117,6 +128,20 @@ class FailedPlay(NamedTuple):
     trial_index: int
     rule: str
     blamed: list[tuple[str, ShownClip]]
+
+
+def main_trials(session: Session, runs: Sequence[Any]) -> dict[int, list[int]]:
+    """The trials that a study counts, by run: those that are neither practice nor a check."""
+    others: dict[int, set[int]] = {run.id: set() for run in runs}
+    # Written like this, an index of these few trials alone answers it.
+    query = select(AssignedTrial.study_run_id, AssignedTrial.trial_index)
+    is_main = AssignedTrial.kind == literal_column("'main'")
+    query = query.where(AssignedTrial.study_run_id.in_(others), ~is_main)
+    for run, trial in session.execute(query):
+        others[run].add(trial)
+    return {
+        run.id: [trial for trial in range(run.trials_total) if trial not in others[run.id]] for run in runs
+    }
 
 
 def met_runs(session: Session, study: Study, origin: str, limit: int) -> list[MetRun]:

@@ -250,6 +250,8 @@ class MonitoredRun(BaseModel):
     last_seen_at: datetime
     answered: int
     trials: int
+    main_answered: int = Field(description="Of `answered`, without practice, attention questions and checks.")
+    main_trials: int = Field(description="Of `trials`, those that the study counts.")
     uncertain: int
     flagged: int
     failed: int

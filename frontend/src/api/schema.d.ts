@@ -1948,6 +1948,8 @@ export interface components {
    last_seen_at: string;
    answered: number;
    trials: number;
+   main_answered: number;
+   main_trials: number;
    uncertain: number;
    flagged: number;
    failed: number;

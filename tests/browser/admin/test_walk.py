@@ -283,3 +283,25 @@ def test_signing_out_and_in(dashboard: Dashboard) -> None:
     page.locator("input[autocomplete=current-password]").fill("correct horse battery")
     page.get_by_role("button", name="Sign in").click()
     expect(page.get_by_role("heading", name="Studies")).to_be_visible()
+
+
+def test_ids_are_copied_whole_and_the_monitor_counts_main_trials(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/short/monitor")
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    # 12 trials: two of practice and two attention questions do not count.
+    expect(page.get_by_role("cell", name="8 of 8")).to_have_count(3)
+    expect(page.get_by_role("cell", name=re.compile("of 12"))).to_have_count(0)
+    expect(page.get_by_text("attention questions and checks are not counted")).to_be_visible()
+
+    page.locator("table.runs a").first.click()
+    page.get_by_role("button", name=re.compile("Copy run id")).click()
+    expect(page.get_by_role("button", name=re.compile("Copied run id"))).to_be_visible()
+    run = page.url.rpartition("/")[2]
+    assert page.evaluate("navigator.clipboard.readText()") == run
+    expect(page.get_by_title(run)).to_be_visible()
+
+    page.goto(f"{dashboard.server.address}/admin/studies/short/settings?part=versions")
+    page.get_by_role("button", name=re.compile("Copy SHA-256")).first.click()
+    expect(page.get_by_role("button", name=re.compile("Copied SHA-256"))).to_be_visible()
+    assert re.fullmatch("[0-9a-f]{64}", page.evaluate("navigator.clipboard.readText()"))
+    assert axe_violations(page) == []

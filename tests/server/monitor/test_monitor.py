@@ -19,8 +19,21 @@ def test_the_monitor_counts_and_colours_trials(viewer: Admin, participant: Parti
     [run] = shown["runs"]
     assert run["heat"] == "gf" + "." * 10
     assert (run["answered"], run["flagged"], run["presence"]) == (2, 1, "here")
+    # Both were practice: the study counts 8 of the 12, without 2 of practice and 2 attention questions.
+    assert (run["main_answered"], run["main_trials"]) == (0, 8)
     assert [step["runs"] for step in shown["funnel"]][:2] == [1, 1]
     assert (shown["active"], shown["complete"], shown["dropped"]) == (1, 0, 0)
+
+
+def test_a_complete_run_has_as_many_main_trials_as_the_study_counts(
+    viewer: Admin, participant: Participant
+) -> None:
+    participant.agree()
+    for trial in participant.state()["trials"]:
+        participant.rate(trial)
+    [run] = viewer.get("/studies/short/monitor").json()["runs"]
+    assert (run["answered"], run["trials"]) == (12, 12)
+    assert (run["main_answered"], run["main_trials"]) == (8, 8)
 
 
 def test_only_changed_runs_are_sent_again(viewer: Admin, client, study: StudyInDatabase) -> None:  # type: ignore[no-untyped-def]

@@ -20,6 +20,7 @@ import { useState } from "react";
 import { api, type Schemas, unwrap, useMay, sealQuery, studyQuery } from "../api";
 import { type DataOrigin, when, counted, ORIGINS } from "../ui/format";
 import { Answer } from "../ui/Answer";
+import { CopyId } from "../ui/CopyId";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { useChange, notify } from "../ui/useChange";
 import { useParams } from "@tanstack/react-router";
@@ -116,7 +117,7 @@ function One({ study, capsule, mayOpen, mayRemove }: OneProps) {
       )}
       {sha256 != null && (
         <Text size="xs" c="dimmed">
-          SHA-256 <code>{sha256.slice(0, 12)}</code>
+          SHA-256 <CopyId value={sha256} what="SHA-256" />
         </Text>
       )}
       {mayRemove && !isUnderWay(capsule) && (
@@ -161,8 +162,8 @@ function Sealed({ study, seal }: Props) {
   return (
     <Stack gap="xs">
       <Text size="sm" className="wrap-anywhere">
-        Version {seal.version} was sealed {when(seal.sealed_at ?? "")}, {seal.power ? "with its power" : "without power"}; sha256{" "}
-        <code>{seal.sha256}</code>
+        Version {seal.version} was sealed {when(seal.sealed_at ?? "")}, {seal.power ? "with its power" : "without power"}; SHA-256{" "}
+        {seal.sha256 != null && <CopyId value={seal.sha256} what="SHA-256" />}
       </Text>
       <Group>
         <Button component="a" variant="default" size="xs" href={address("json")} download>

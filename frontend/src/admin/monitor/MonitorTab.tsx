@@ -179,7 +179,7 @@ function RunTable({ study, snapshot }: { study: string; snapshot: Schemas["Monit
               <th className="only-wide">Stage</th>
               <th className="only-wide one-line">Last seen</th>
               <th className="only-wide one-line">A person</th>
-              <th className="only-wide">Trials</th>
+              <th className="only-wide one-line">Main trials</th>
               <th className="trials">Each trial</th>
             </tr>
           </thead>
@@ -190,6 +190,10 @@ function RunTable({ study, snapshot }: { study: string; snapshot: Schemas["Monit
           </tbody>
         </table>
       </div>
+      <Text size="sm" c="dimmed">
+        Main trials are those that the study counts. Practice trials, attention questions and checks are not counted, but are among the
+        squares of “Each trial”.
+      </Text>
     </Stack>
   );
 }
@@ -211,7 +215,7 @@ const Row = memo(function Row({ study, run, seen }: { study: string; run: Run; s
       <td className="only-wide one-line">{seen}</td>
       <td className="only-wide one-line">{run.evidence_verdict ? words(run.evidence_verdict) : ""}</td>
       <td className="number only-wide one-line">
-        {run.answered} of {run.trials}
+        {run.main_answered} of {run.main_trials}
       </td>
       <td>
         <HeatRow heat={run.heat} label={`${run.answered} answered, ${run.flagged} flagged, ${run.failed} failed`} />

@@ -3,6 +3,7 @@ import { useDisclosure } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
 import { api, unwrap, type Schemas, useMay } from "../api";
 import { Answer } from "../ui/Answer";
+import { CopyId, TextWithIds } from "../ui/CopyId";
 import { plain, fixed, ruleWords, VERDICT_COLOURS, when, words } from "../ui/format";
 import { useState } from "react";
 import { useChange } from "../ui/useChange";
@@ -129,7 +130,9 @@ function Ask({ label, words, field, ready, onDone }: AskProps) {
         {label}
       </Button>
       <Modal opened={opened} onClose={close} title={label} closeButtonProps={{ "aria-label": "Close" }}>
-        <Text mb="md">{words}</Text>
+        <Text mb="md" component="div">
+          <TextWithIds text={words} />
+        </Text>
         <TextInput label={field} value={text} onChange={(event) => setText(event.currentTarget.value)} data-autofocus />
         <Group justify="flex-end" mt="md">
           <Button variant="default" onClick={close}>
@@ -290,6 +293,9 @@ export function TimelinePage() {
                   {words(data.summary.status)}, began {when(data.summary.started_at)},{" "}
                   {data.consented_at === null ? "has not agreed" : `agreed ${when(data.consented_at)}`}, {data.summary.minutes.toFixed(1)}{" "}
                   minutes, language {data.summary.language}, through “{data.summary.link}”
+                </Text>
+                <Text size="sm" c="dimmed" component="div">
+                  Run <CopyId value={data.summary.run} what="run id" />
                 </Text>
                 {data.summary.excluded && <Text c="var(--mantine-color-error)">Excluded: {data.summary.exclusion_reason}</Text>}
               </div>

@@ -4,6 +4,7 @@ import { api, unwrap } from "../api";
 import { DataTable } from "../ui/DataTable";
 import { plain, when, words } from "../ui/format";
 import { PagedAnswer } from "../ui/Answer";
+import { TextWithIds } from "../ui/CopyId";
 
 const A_PAGE = 50;
 
@@ -32,8 +33,12 @@ export function AuditPage() {
           columns={[
             { title: "When", wrap: true, cell: (row) => when(row.at) },
             { title: "Who", cell: (row) => row.actor },
-            { title: "What", wrap: true, cell: (row) => `${words(row.action)}: ${words(row.target_kind)} ${row.target}`.trim() },
-            { title: "Details", wrap: true, wide: true, cell: (row) => detailWords(row.details) },
+            {
+              title: "What",
+              wrap: true,
+              cell: (row) => <TextWithIds text={`${words(row.action)}: ${words(row.target_kind)} ${row.target}`.trim()} />,
+            },
+            { title: "Details", wrap: true, wide: true, cell: (row) => <TextWithIds text={detailWords(row.details)} /> },
           ]}
         />
       </PagedAnswer>

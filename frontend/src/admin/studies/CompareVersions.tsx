@@ -5,6 +5,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
+import { CopyId } from "../ui/CopyId";
 import { DataTable } from "../ui/DataTable";
 import { labelOf } from "../builder/data";
 import { counted, languageName, when, words } from "../ui/format";
@@ -173,7 +174,7 @@ export function Versions({ detail }: { detail: Schemas["StudyDetail"] }) {
           { title: "Made", cell: (version) => when(version.created_at) },
           { title: "Runs", number: true, cell: (version) => version.runs },
           { title: "Note", wrap: true, cell: (version) => version.note },
-          { title: "SHA-256", wide: true, cell: (version) => <code>{version.definition_sha256.slice(0, 12)}</code> },
+          { title: "SHA-256", wide: true, cell: (version) => <CopyId value={version.definition_sha256} what="SHA-256" /> },
         ]}
       />
     </Card>
