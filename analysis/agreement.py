@@ -112,6 +112,7 @@ def read_items(
     if scale is not None:
         _refuse_outside(table, items, answers, scale)
         turned = [name in reverse for name in items]
+        # Low plus high less the answer turns it about, wherever the scale begins.
         answers[:, turned] = sum(scale) - answers[:, turned]
     keep: NDArray[np.bool_] = np.asarray(np.isfinite(answers).all(axis=1))
     if not keep.all():
@@ -210,6 +211,7 @@ def _one_factor(answers: Floats) -> tuple[Floats | None, str]:
     n, items = answers.shape
     if items < MIN_OMEGA_ITEMS:
         return None, f"omega needs {MIN_OMEGA_ITEMS} items or more"
+    # With no more cases than items the correlations are singular.
     if n <= items:
         return None, f"omega needs more cases than items, got {n} and {items}"
     # Maximum likelihood does not depend on the items' scales, so that correlations are enough.
@@ -239,6 +241,7 @@ def _likeliest(correlations: Floats, n: int) -> Floats:
         likelihoods = [model.loglike((fit.loadings, fit.uniqueness)) for fit in fits]
     if not fits:
         return np.full(len(correlations), np.nan)
+    # A fit that ended in no number must never win.
     best = fits[int(np.argmax(np.nan_to_num(likelihoods, nan=-np.inf)))]
     return np.asarray(best.loadings, dtype=np.float64)[:, 0]
 
@@ -253,9 +256,11 @@ def _fit(model: Any, start: int) -> Any:
 
 def _is_maximum(correlations: Floats, loadings: Floats) -> bool:
     """Whether the likelihood of one factor is flat at these loadings, in each item's own variance."""
+    # Standardized items have a variance of 1, which the factor and the item's own part share.
     implied = np.outer(loadings, loadings)
     np.fill_diagonal(implied, 1.0)
     inverse = np.linalg.inv(implied)
+    # Times the item's own variance: a slope by its logarithm, which does not depend on how small it is.
     slopes = np.diag(inverse @ (implied - correlations) @ inverse) * (1 - loadings**2)
     return bool(np.abs(slopes).max() < FLAT)
 

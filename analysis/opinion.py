@@ -86,6 +86,7 @@ def alternating_projection(
     Projection
     """
     seen = np.isfinite(scores)
+    # One vote cannot be divided into a bias and the rest.
     people = seen.sum(axis=1) > 1
     items = seen[people].any(axis=0)
     nobody, nothing = np.full(people.size, np.nan), np.full(items.size, np.nan)
@@ -138,6 +139,7 @@ def _projected(scores: Array, counts: Array, squares: Array) -> Projection:
         fit = _weighted(votes, number, apart, person_groups, held)
         common = _common(fit.residual, number, apart)
         fallen = (fit.spread <= COLLAPSED * common) & ~held
+        # Where all residuals are those of rounding, everybody's fall to nothing alike.
         if not fallen.any() or common == 0:
             break
         # Held for good, so that the outer loop ends after as many rounds as there are people at most.
@@ -210,6 +212,7 @@ def _tied(seen: Flags) -> tuple[Codes, Codes]:
     """Which people and which items votes tie together, as numbers from 0."""
     people, items = seen.shape
     person, item = np.nonzero(seen)
+    # People and items are the nodes of one graph, and the votes its edges.
     graph = coo_array((np.ones(person.size), (person, item + people)), shape=(people + items,) * 2)
     codes = connected_components(graph, directed=False)[1].astype(np.int64)
     return codes[:people], codes[people:]

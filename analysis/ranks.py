@@ -285,6 +285,7 @@ def _wilcoxon(differences: Floats, side: Side = "two-sided") -> tuple[float, boo
     """p of the signed-rank test, and whether it is exact."""
     changed = differences[differences != 0]
     if len(changed) == 0:
+        # Without any difference there is no rank to sum, and nothing speaks for one.
         return 1.0, False
     # R's rule: exact only without ties and without zero differences.
     untied = len(np.unique(np.abs(changed))) == len(changed)
@@ -298,6 +299,7 @@ def _equivalent(bounds: Bounds, one_sided: Callable[[float, Side], float]) -> fl
     """Two one-sided tests: above the lower bound, and below the upper one."""
     if bounds is None:
         return None
+    # Both must be significant, so that the greater p decides.
     return max(one_sided(bounds[0], "greater"), one_sided(bounds[1], "less"))
 
 
@@ -337,6 +339,7 @@ def _mann_whitney(a: Floats, b: Floats, side: Side = "two-sided") -> tuple[float
 
 
 def _biserial(a: Floats, b: Floats) -> float:
+    # Equal to 2 U / (n m) - 1: a tie counts half in U, and 0 here.
     higher = np.sign(a[:, None] - b[None, :])
     return float(higher.mean())
 

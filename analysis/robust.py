@@ -123,6 +123,7 @@ def _ratio(scores: Floats, directions: Floats, basis: Floats) -> Floats:
 def _applied(residual: Floats, draws: Iterator[Floats], flips: bool) -> Iterator[Floats]:
     """The residuals rearranged, a chunk (B, N, q) at a time."""
     for drawn in draws:
+        # Orders come as floats as well, so that signs and orders have one type.
         yield drawn[:, :, None] * residual if flips else residual[drawn.astype(np.int64)]
 
 
@@ -132,6 +133,7 @@ def _rearrangements(
     """Chunks (B, n) of signs or orders of n participants: all where they are few; how many; whether all."""
     # Where all can be tried none is drawn: the p is then exact, and the same for every seed.
     every = 2**n if flips else factorial(n)
+    # One more, since all of them include the data as they are.
     if every <= n_random + 1:
         orders = product((1.0, -1.0), repeat=n) if flips else permutations(range(n))
         return _chunks(orders), every, True
@@ -247,11 +249,13 @@ def _effect_of(means: Floats, axes: tuple[int, ...]) -> Floats:
 
 
 def _ranks(values: Floats) -> Floats:
+    # Values that are all zero would divide by zero.
     largest = float(np.abs(values).max()) or 1.0
     # scipy.stats has this too, and takes longer to import than all tests of a report to compute
     _, position, count = np.unique(
         np.round(values / largest, DIGITS), return_inverse=True, return_counts=True
     )
+    # Ties share the mean of the ranks that they take up: the last one less half the others.
     mean_rank = np.cumsum(count) - (count - 1) / 2
     return np.asarray(mean_rank[position], dtype=np.float64).reshape(values.shape)
 

@@ -171,12 +171,15 @@ def _unequal(first: str, second: str, a: Floats, b: Floats) -> MeanTest:
         raise InputError(f"neither {first} nor {second} varies between participants; there is no t test")
     errors = variances / n
     difference, se = float(a.mean() - b.mean()), float(errors.sum() ** 0.5)
+    # Welch and Satterthwaite's degrees of freedom.
     df = float(errors.sum() ** 2 / (errors**2 / (n - 1)).sum())
+    # The size pools the variances, which the test does not.
     pooled_df = int(n.sum() - 2)
     pooled = float(((n - 1) * variances).sum() / pooled_df) ** 0.5
     scale, d = float((1 / n).sum()) ** 0.5, difference / pooled
     error = ((scale**2 + d**2 / pooled_df / 2) * float(n.sum()) / pooled_df) ** 0.5
     approximate = float(stats.t.ppf(0.975, pooled_df)) * error
+    # n1 n2 / (n1 + n2) takes the place of n in the Bayes factor of two groups.
     size = _Size(d / scale, scale, pooled_df, scale**-2, approximate)
     return _tested(first, second, difference, se, df, size)
 

@@ -106,12 +106,14 @@ def lag_of(clips: Sequence[ClipTraces], max_lag_s: float, seed: int = 0) -> LagR
     if len(people) < 2:
         return None
     rate = eventful[0].rate_hz
+    # One more, since a lag of 0 counts as well.
     lags = int(min(max_lag_s * rate, min(clip.values.shape[1] for clip in eventful) - 1)) + 1
     row_of = {person: index for index, person in enumerate(people)}
     sums, counts = np.zeros((len(people), lags)), np.zeros(len(people))
     for clip in eventful:
         train = event_train(clip.events_s, clip.values.shape[1], clip.rate_hz)
         rows = [row_of[person] for person in clip.people]
+        # Unlike `+=`, which would add once where a person comes twice.
         np.add.at(sums, rows, correlogram(clip.values, train)[:, :lags])
         np.add.at(counts, rows, 1)
     each: Array = sums / counts[:, None]
@@ -144,6 +146,7 @@ def _chance(clips: Sequence[ClipTraces], lags: int, rng: np.random.Generator) ->
         weights.append(len(clip.people))
 
     def greatest(shifts: Sequence[int]) -> float:
+        # Shifted events only turn the correlogram, which need not be computed again.
         rows = [np.roll(row, -shift)[:lags] for row, shift in zip(means, shifts, strict=True)]
         return float(np.average(rows, axis=0, weights=weights).max())
 

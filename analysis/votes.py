@@ -150,6 +150,7 @@ def _by_correlation(scores: Array, limit: float) -> dict[int, str]:
     reasons: dict[int, str] = {}
     kept = np.ones(len(scores), dtype=bool)
     while kept.sum() >= RATERS_MIN:
+        # People who have gone must never be the lowest again.
         r = np.full(len(scores), np.inf)
         r[kept] = mean_correlations(scores[kept])
         lowest = int(np.argmin(r))
@@ -194,8 +195,10 @@ def bt500_counts(scores: Array) -> tuple[Codes, Codes, NDArray[np.bool_]]:
     varied = squares > 0
     sd = np.sqrt(squares / np.maximum(n - 1, 1))
     fourth = np.nansum(centred**4, axis=0)
+    # m4 / m2^2 with moments over n, unlike the SD above, which is over n - 1.
     kurtosis = np.divide(fourth * n, squares**2, out=np.zeros_like(squares), where=varied)
     limit = np.where((kurtosis >= 2) & (kurtosis <= 4), 2.0, np.sqrt(20.0)) * sd
+    # Where nothing varies the limit is 0, which every vote reaches.
     above = np.sum((centred >= limit) & varied, axis=1)
     below = np.sum((centred <= -limit) & varied, axis=1)
     share = (above + below) / np.maximum(seen.sum(axis=1), 1)

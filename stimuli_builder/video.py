@@ -111,6 +111,7 @@ def _clock_packets(path: Path, container: Any, stream: Any) -> tuple[Stamps, flo
     """Stamps of the video's frames, seconds a tick, and where the last packet of any stream ends."""
     times, timeless = array("q"), False
     reached_s = 0.0
+    # The declared length counts from the first stamp, which need not be 0.
     begun_s = (container.start_time or 0) / av.time_base
     try:
         for packet in container.demux():
@@ -128,6 +129,7 @@ def _clock_packets(path: Path, container: Any, stream: Any) -> tuple[Stamps, flo
         raise InputError(f"{path}: holds no video frame; it is empty or damaged: copy the file again")
     if timeless:
         return np.arange(len(times)), float(1 / (stream.average_rate or Fraction(25))), reached_s
+    # Packets come in the order of decoding, in which a frame may precede one that is shown earlier.
     return np.sort(np.frombuffer(times, np.int64)), float(stream.time_base), reached_s
 
 
@@ -204,9 +206,11 @@ def _packets(path: Path, limit: int) -> int:
 def grey(frame: Any) -> Picture:
     """Luminance of a decoded frame, uint8 (height, width), upright as players show it."""
     name = frame.format.name
+    # Formats of 8 bits whose first plane is the luma; those of more bits end in le or be.
     if not name.startswith(LUMA_FIRST) or name.endswith(("le", "be")):
         frame = frame.reformat(format="gray")
     plane = frame.planes[0]
+    # Rows may be padded to the decoder's alignment: the picture is the left part.
     rows = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
     return _upright(frame, rows[: frame.height, : frame.width])
 
@@ -260,6 +264,7 @@ def _seek(info: VideoInfo, container: Any, stream: Any, number: int) -> Picture:
     stamp = int(info.stamps[number])
     try:
         container.seek(stamp, stream=stream, backward=True)
+        # The seek lands on a key frame before, from which decoding goes on to the frame that is meant.
         for frame in container.decode(stream):
             if frame.pts is not None and frame.pts >= stamp:
                 return grey(frame)
@@ -315,6 +320,7 @@ def _produce(
         _put(waiting, batch, stop)
         _put(waiting, None, stop)
     except Exception as error:
+        # The frames before the damage are good, and go out first.
         _put(waiting, batch, stop)
         _put(waiting, error, stop)
 
@@ -326,6 +332,7 @@ def _put(
 ) -> None:
     while not stop.is_set():
         try:
+            # With a time limit: else a consumer that has gone would leave this thread waiting for ever.
             waiting.put(item, timeout=0.2)
         except Full:
             continue
@@ -455,6 +462,7 @@ class VideoWriter:
         check_video_name(path)
         self.path = path
         self._temporary = temporary_beside(path, suffix=path.suffix)
+        # A rate such as 30000/1001 comes as a float, and is exact again with a limited denominator.
         rate = Fraction(fps).limit_denominator(100_000)
         try:
             self._container = av.open(str(self._temporary), "w")
@@ -465,6 +473,7 @@ class VideoWriter:
         self._stream.width, self._stream.height = size_px
         self._stream.pix_fmt = "yuv420p"
         self._stream.options = {"crf": str(crf), "preset": preset, "x264-params": "log-level=error"}
+        # One key frame a second, so that a seek decodes a second at most.
         self._stream.codec_context.gop_size = max(1, round(fps))
 
     def write(self, picture: Picture) -> None:
@@ -488,6 +497,7 @@ class VideoWriter:
     ) -> None:
         try:
             if kind is None:
+                # None makes the encoder give out the frames that it still holds.
                 for packet in self._stream.encode(None):
                     self._container.mux(packet)
             self._container.close()

@@ -260,6 +260,7 @@ def scale_cases(prepared: PlanRows, scales: Sequence[RatedScale]) -> pd.DataFram
     """One row per rated trial, one column per scale, reverse-keyed ones reversed; only complete trials."""
     rows = prepared.rows
     keys = [name for name in ("run", "trial_index", "play") if name in rows.columns]
+    # Tables of other programs have no number of a trial: the cell takes its place.
     if "trial_index" not in keys:
         keys = ["run", *prepared.experiment.factor_names]
     columns = {}
@@ -271,7 +272,6 @@ def scale_cases(prepared: PlanRows, scales: Sequence[RatedScale]) -> pd.DataFram
 
 
 def cronbach_alpha(cases: pd.DataFrame) -> dict[str, Any] | None:
-    # Tables of other programs have no number of a trial: the cell takes its place.
     """Alpha with its 95% interval (Feldt), by pingouin; None where a scale does not vary."""
     # pingouin takes seconds to import, which one scale need not pay
     from pingouin import cronbach_alpha as alpha_of

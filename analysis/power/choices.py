@@ -62,6 +62,7 @@ class PairsDesign:
     @cached_property
     def _neighbours(self) -> list[tuple[int, int]]:
         order = np.argsort(self.abilities, kind="stable").tolist()
+        # The better item first, and no pair of equal ones: they have no difference to find.
         return [(b, a) for a, b in pairwise(order) if self.abilities[a] != self.abilities[b]]
 
     @property
@@ -104,6 +105,7 @@ class PairsDesign:
             return self._robust_p(model, fitted, of_raters[:, :, : fitted.shares.shape[1]])
         q, full = len(self.abilities) - 1, free_abilities(len(self.abilities))
         chi2 = 2 * (fitted.log_likelihood - _equal(counts))
+        # Rounding may leave it a little below zero.
         p = [float(special.chdtrc(q, max(chi2, 0.0)))]
         for a, b in self._neighbours:
             contrast = full[a] - full[b]
@@ -121,6 +123,7 @@ class PairsDesign:
         if not self.tie:
             chosen = rng.binomial(self.repeats, special.expit(logit)).astype(np.float64)
             return np.stack([chosen, self.repeats - chosen], axis=2)
+        # Of comparisons of equal items the share nu / (2 + nu) are ties.
         log_nu = np.full_like(logit, np.log(2 * self.tie / (1 - self.tie)))
         shares = special.softmax(np.stack([logit / 2, -logit / 2, log_nu], axis=2), axis=2)
         return rng.multinomial(self.repeats, shares).astype(np.float64)
@@ -178,6 +181,7 @@ def _equal(counts: Counts) -> float:
     total = float(counts.outcomes.sum())
     tied = float(counts.outcomes[:, TIE:].sum())
     decided = total - tied
+    # 0 log 0 is 0 here, where nothing was tied.
     return float(special.xlogy(tied, tied / total) + special.xlogy(decided, decided / (2 * total)))
 
 
@@ -266,6 +270,7 @@ class ThresholdDesign:
 
     def _measured(self, threshold: float, rng: np.random.Generator) -> float:
         x = np.array(self.levels, dtype=np.float64)
+        # A Weibull threshold is above 0, however far people spread.
         location = max(threshold, 1e-6) if self.shape == "weibull" else threshold
         share = function(self.shape, x, location, float(np.log(self.spread)))
         chance = self.guess + (1 - self.guess - self.lapse) * share
@@ -279,6 +284,7 @@ class ThresholdDesign:
         model = Likelihood(trials, self.shape, self.guess, self.lapse, falling=False)
         fitted = float(model.maximum({}, np.array([location, np.log(self.spread)]))[0][0])
         low, high = float(x.min()), float(x.max())
+        # So far from all stimuli the fit has found no threshold.
         outside = not low - 3 * (high - low) <= fitted <= high + 3 * (high - low)
         return float("nan") if outside else fitted
 

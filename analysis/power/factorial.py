@@ -113,8 +113,10 @@ class FactorialDesign:
             share = np.ones(())
             for name, count in levels.items():
                 inside = name in effect.split(":")
+                # Levels lie evenly along a line, so that an effect is linear in each of its factors.
                 line = np.linspace(-1, 1, count) if inside else np.ones(count)
                 share = share[..., None] * line
+            # Scaled to an SD of f, as the means are in units of the SD within a cell.
             total += size * share / np.sqrt(np.mean(share**2))
         groups = int(np.prod(list(self.between.values()), dtype=np.int64))
         return total.reshape(groups, -1)

@@ -185,6 +185,7 @@ class MixedDesign:
     def _apart(self, sd: float, levels: int, rng: np.random.Generator) -> Floats:
         """Each level's own part in every condition (levels, conditions): any two differ with this SD."""
         own = rng.normal(0, sd / np.sqrt(2), (levels, self.conditions))
+        # Centered, so that the mean over conditions keeps its spread.
         return np.asarray(own - own.mean(axis=1, keepdims=True), dtype=np.float64)
 
     def _coded(self, n: int, clips: int, faces: int) -> tuple[ModelData, list[Term]]:
@@ -192,6 +193,7 @@ class MixedDesign:
         key = (n, clips, faces)
         if key not in self._known:
             shown = [
+                # Faces change fastest, so that every face has clips in every condition.
                 (clip, condition, clip % faces)
                 for clip in range(clips)
                 for condition in (
@@ -199,6 +201,7 @@ class MixedDesign:
                 )
                 for _ in range(self.repeats)
             ]
+            # Its ratings are placeholders: those of a data set are drawn each time.
             rows = pd.DataFrame(
                 [(f"p{p}", f"c{c}", f"m{m}", f"f{f}") for p in range(n) for c, m, f in shown],
                 columns=["participant", "clip", "condition", "face"],
@@ -308,10 +311,12 @@ class OrdinalDesign:
         clip, condition = np.tile(self._shown, (n, 1)).T
         person = np.repeat(np.arange(n), len(self._shown))
         own = self.sd_slope / np.sqrt(2) * rng.normal(size=(n, self.conditions))
+        # Against the first condition, whose spread stays `sd_participant`; any two differ by `sd_slope`.
         apart = np.array([0.0, *self.differences]) + own - own[:, :1]
         eta = self.sd_participant * rng.normal(size=n)[person] + apart[person, condition]
         eta = eta + self.sd_clip * rng.normal(size=self.clips)[clip]
         thresholds = special.logit(np.cumsum(self._shares)[:-1])
+        # Logistic noise makes the share below a threshold the inverse logit of the model.
         noise = special.logit(rng.uniform(size=len(eta)))
         rating = 1 + (thresholds < (eta + noise)[:, None]).sum(axis=1)
         columns = {"participant": person, "clip": clip, "condition": condition, "rating": rating}

@@ -104,6 +104,7 @@ def simulate_power(
 def _draw(plan: Plan, population: Population, count: int, n: int, rng: np.random.Generator) -> Floats:
     """Cell means (count, n, cells) as ratings of the experiment's trials can give them."""
     values, vectors = np.linalg.eigh(population.covariance)
+    # Rounding may leave eigenvalues a little below zero, which have no root.
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     y = population.means + rng.normal(size=(count, n, len(values))) @ root.T
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats

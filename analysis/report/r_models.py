@@ -202,12 +202,14 @@ def pairs_files(
 def _choices(comparisons: Comparisons, ties: bool) -> Rows:
     """How often each rater chose either side of a pair; raters and items are numbers."""
     given = comparisons.participant
+    # Choices without a rater count as those of one.
     rater = np.zeros_like(comparisons.left) if given is None else given
     asked, at = np.unique(
         np.stack([rater, comparisons.left, comparisons.right], axis=1), axis=0, return_inverse=True
     )
     outcomes = np.zeros((len(asked), 3 if ties else 2), dtype=np.int64)
     np.add.at(outcomes, (at.ravel(), comparisons.outcome), 1)
+    # R counts from 1.
     rows: Rows = np.hstack([asked + 1, outcomes]).tolist()
     return rows
 
@@ -354,6 +356,7 @@ def _trials(fitted: "dict[str, SeriesFit]", answers: "dict[str, Answers]", peopl
             return_inverse=True,
         )
         n, k = np.bincount(at), np.bincount(at, weights=given.response)
+        # Neither a code nor a number has a blank, so that the key can be taken apart again.
         for label, given_times, yes in zip(keys.tolist(), n.tolist(), k.tolist(), strict=True):
             rater, x = label.split(" ")
             rows.append([name, rater, x, given_times, int(yes)])
@@ -406,6 +409,7 @@ def _is_model(script: Path) -> bool:
 def _run(script: Path) -> str:
     told = subprocess.run(  # noqa: S603 - the project's own script, in a folder that the caller chose
         [rscript(), "--vanilla", script.name],
+        # R's messages in English, whatever the computer's language: they are searched below.
         env={**os.environ, "LC_ALL": "C.UTF-8"},
         cwd=script.parent,
         capture_output=True,

@@ -90,6 +90,7 @@ SEPTIC_ONSET = float(np.interp(ONSET, _septic(np.linspace(0, 1, 4001)), np.linsp
 
 def _recovery(t: Values, up_s: float) -> Values:
     """Reopening, 0 to 1: a fast part and a slow tail, 95% reached after `up_s`."""
+    # From (1 - FAST_SHARE) exp(-up_s / slow_s) = 1 - SETTLED.
     slow_s = up_s / np.log((1 - FAST_SHARE) / (1 - SETTLED))
     rise = _septic(t / (0.84 * up_s))
     tail = (1 - np.exp(-np.maximum(t, 0) / slow_s)) * _septic(t / (0.6 * up_s))
@@ -98,6 +99,7 @@ def _recovery(t: Values, up_s: float) -> Values:
 
 def blink_closure(times_s: Values, blink: Blink) -> Values:
     """Closure this blink adds at each time, 0 to its depth."""
+    # The plan counts from 5% of the depth, where the step has begun already.
     length = blink.down_s / (1 - SEPTIC_ONSET)
     down = _septic((times_s - blink.apex_s) / length + 1)
     up = 1 - _recovery(times_s - blink.apex_s, blink.up_s)
@@ -144,6 +146,7 @@ def course(times_s: Values, blinks: list[Blink], seed: int) -> Course:
         both[start:stop, 0] = np.maximum(both[start:stop, 0], blink_closure(part, blink))
         other = blink_closure(part + lag, blink) * (1.0 if blink.depth == 1 else 1 + share)
         both[start:stop, 1] = np.maximum(both[start:stop, 1], other)
+    # The lid wanders less as it closes, and not at all when it is shut.
     rest = 0.035 * _wander(times_s, rng, (4, 23))
     number, phase = _phases(times_s, blinks)
     return Course(
@@ -180,6 +183,7 @@ def _wander(times_s: Values, rng: np.random.Generator, periods_s: tuple[float, f
     for _ in range(5):
         period, phase = rng.uniform(*periods_s), rng.uniform(0, 2 * np.pi)
         total += np.sin(2 * np.pi * times_s / period + phase)
+    # A sum of five sines grows by the root of their number.
     return np.asarray(total / np.sqrt(5))
 
 
@@ -224,6 +228,7 @@ class Actor:
         self._noise = (options.noise * rng.standard_normal(NOISE_TILE)).astype(np.float32)
         self._places = np.random.default_rng([options.seed, 3])
         blinks = plan_blinks(options.seconds, np.random.default_rng([options.seed, 4]))
+        # From half a frame before: sample number * FINE + FINE / 2 is at the time of a frame.
         fine_s = (np.arange(options.frame_count * FINE) - FINE // 2) / (options.fps * FINE)
         self._fine = course(fine_s, blinks, options.seed)
         self.course = course(np.arange(options.frame_count) / options.fps, blinks, options.seed)

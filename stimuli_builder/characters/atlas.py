@@ -85,6 +85,7 @@ class StillPixels:
 
     def hold(self, pictures: NDArray[Any]) -> None:
         """Give such pixels of (n, h, w, 3) pictures, in whatever encoding, their value in the first."""
+        # Both differences are 0 or more, so that uint8 does not wrap round.
         off = np.maximum(self._high - self._first, self._first - self._low)
         still = ~(off > STILL_CODES).any(axis=-1, keepdims=True)
         for picture in pictures[1:]:
@@ -134,6 +135,7 @@ def _count(content: bytes) -> int:
 def _frame(picture: NDArray[np.uint8]) -> av.VideoFrame:
     frame = av.VideoFrame(picture.shape[1], picture.shape[0], FORMAT)
     for plane, content in zip(frame.planes, planes_of(picture), strict=True):
+        # FFmpeg pads rows to its alignment.
         rows = np.zeros((plane.height, plane.line_size // content.itemsize), content.dtype)
         rows[:, : content.shape[1]] = content
         plane.update(rows.tobytes())
@@ -147,6 +149,7 @@ def _rgb(frame: Any) -> NDArray[np.uint8]:
     planes = frame_planes(frame)
     if frame.format.name == FORMAT:
         return picture_of(planes)
+    # Planes of gbrp are green, blue and red.
     return np.stack([planes[2], planes[0], planes[1]], -1)
 
 
@@ -238,6 +241,7 @@ class LowerLidLayer:
         for index in np.flatnonzero(weights):
             image += weights[index] * srgb_to_linear(self._level_srgb(int(index)))[self.window]
         open_eye, open_blurred = self._open_eye
+        # Dark places would divide by nearly nothing.
         ratio = _blur(image, self._sigma) / np.maximum(open_blurred, 1e-3)
         # Never take more light from a pixel than it has: lashes over the lid would turn into red flecks.
         left = (image + DARKEST) / (open_eye + DARKEST)
@@ -373,6 +377,7 @@ class Atlas:
         still, count = StillPixels(first), 1
         out[0] = convert(first)
         for count, frame in enumerate(frames, start=2):
+            # Seen even if it is not kept, as in `decode_level_video`: both must hold the same pixels.
             still.see(frame)
             if count <= len(out):
                 out[count - 1] = convert(frame)
@@ -396,6 +401,7 @@ class Atlas:
     def fingerprint(self) -> str:
         """SHA-256 of the declaration and every picture file, in hexadecimal digits."""
         digest = hashlib.sha256((self.folder / DECLARATION_FILE).read_bytes())
+        # Each file once, as levels may share a video.
         for file in dict.fromkeys(picture.file for picture in _pictures(self.declaration)):
             try:
                 digest.update((self.folder / file).read_bytes())
@@ -508,6 +514,7 @@ def restore(name: str, source: Path | None, target: Path) -> Path:
         return target
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        # In the folder of the target, since a rename to another disk is not possible.
         with tempfile.TemporaryDirectory(prefix=f".{name}-", dir=target.parent) as folder:
             draft = Path(folder) / "character"
             _take(name, retired, source or ROOT, draft)

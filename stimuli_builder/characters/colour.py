@@ -60,6 +60,7 @@ def level_weights(levels: NDArray[np.float64], closures: ArrayLike) -> NDArray[n
            [0. , 0. , 1. ]])
     """
     closures = np.asarray(closures, dtype=np.float64)
+    # Clipped, so that the ends have a level on either side as well.
     upper = np.clip(np.searchsorted(levels, closures, side="left"), 1, len(levels) - 1)
     low, high = levels[upper - 1], levels[upper]
     share = (closures - low) / (high - low)
@@ -101,6 +102,7 @@ def picture_of(planes: Sequence[NDArray[np.uint16]]) -> NDArray[np.uint8]:
     bright, greenish, orange = (plane.astype(np.int16) for plane in planes)
     greenish -= MIDDLE
     orange -= MIDDLE
+    # Two more, since a shift by two bits rounds down.
     rest = bright - greenish + 2
     out = np.empty((*bright.shape, 3), np.uint8)
     for channel, quadruple in enumerate((rest + orange, bright + greenish + 2, rest - orange)):

@@ -123,9 +123,11 @@ def read_eye_track(path: Path, info: VideoInfo, one_eye: bool) -> EyeTrack:
             f"{path}: its points are outside the picture of {info.size_px[0]} x {info.size_px[1]} pixels; "
             "use the track of this video"
         )
+    # Median of what is near the widest: a single wide frame does not decide.
     opened = np.nanmedian(
         np.where(distance > 0.75 * np.nanpercentile(distance, 90, axis=0), distance, np.nan), 0
     )
+    # A few frames lie below it: a single false one does not decide.
     shut = np.nanpercentile(distance, min(50.0, 300 / len(rows)), axis=0)
     if (shut > DEEPEST_SHARE * opened).any():
         deepest = 1 - float((shut / opened).max())
@@ -152,6 +154,7 @@ class Opening:
 
 def closing_events(closure: Values) -> list[tuple[int, int]]:
     """First and last frame of each run that is more than half shut."""
+    # With False at either end, so that a run which reaches it has two edges.
     shut = np.concatenate([[False], closure > 0.5, [False]])
     edges = np.flatnonzero(shut[1:] != shut[:-1])
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -172,6 +175,7 @@ def find_openings(track: EyeTrack, info: VideoInfo) -> tuple[list[Opening], Coun
     for number, (first, last) in enumerate(events):
         limit = min(len(closure) - 1, last + round(OPEN_AGAIN_S * info.fps))
         if number + 1 < len(events):
+            # At most half way to the next blink, whose frames are not part of this opening.
             limit = min(limit, (last + events[number + 1][0]) // 2)
         deepest = float(closure[first : last + 1].max())
         if deepest < SHUT:
@@ -187,6 +191,7 @@ def find_openings(track: EyeTrack, info: VideoInfo) -> tuple[list[Opening], Coun
         if track.eyes == 2 and np.median(np.abs(np.diff(closures[shut : opened + 1], axis=1))) > EYES_DIFFER:
             refused["the two eyes do not close together"] += 1
             continue
+        # Where the lid falls back on its way, the least closure so far counts.
         path = np.minimum.accumulate(closure[shut : opened + 1])
         gap = float(-np.diff(path).min())
         if gap > WIDEST_GAP:
@@ -255,6 +260,7 @@ class Region:
 
     def points(self, points: Points) -> Points:
         """Points of the video in pixels of the region."""
+        # Pixel centers are whole numbers, so that the picture begins at -1/2.
         return np.asarray((points - [self.x, self.y] + 0.5) * self.scale - 0.5)
 
 
@@ -424,6 +430,7 @@ def align_opening(
     target = region.cut(pictures[base])
     shear = _largest_shear(pictures, track, opening, region, mask)
     matrices = _head_motion(pictures, track, opening, region, mask, shear > SHEAR, advance)
+    # Odd, so that the window has a middle.
     window = max(1, round(SMOOTH_S * info.fps)) | 1
     matrices = _smoothed_in_time(matrices, window)
     moved, measures = {}, {}
@@ -439,6 +446,7 @@ def align_opening(
             decibels(error),
         )
     chosen, closures = _thinned(track, opening)
+    # Matrices lead from the open frame to the others, and points go the other way.
     points = np.array(
         [
             cv2.transform(
@@ -488,6 +496,7 @@ def _largest_shear(
         start = _by_canthi(track, region, opening.opened, number)
         fit = _registered(target, gray_codes(region.cut(pictures[number])), start, mask, sheared=True)
         if fit is not None:
+            # A turn has opposite signs in these two places and cancels.
             shears.append(float(fit[1][0, 1] + fit[1][1, 0]))
     return float(np.ptp(shears))
 
@@ -512,6 +521,7 @@ def _head_motion(
         if fit is None or fit[0] < SURE:
             other = _registered(target, picture, _by_canthi(track, region, base, number), mask, sheared)
             fit = max((one for one in (fit, other) if one is not None), key=lambda one: one[0], default=None)
+        # Where neither fits, the head is taken to be where it was in the frame tried before.
         if fit is not None:
             known = fit[1]
         matrices[number] = known
@@ -529,6 +539,7 @@ def _registered(
         likeness, matrix = cv2.findTransformECC(
             target, picture, start.astype(np.float32), motion, stop, mask, FILTER_PX
         )
+    # OpenCV raises where the search does not converge.
     except cv2.error:
         return None
     return float(likeness), np.asarray(matrix, np.float64)
@@ -582,6 +593,7 @@ def _evened(picture: Image, target: Image, mask: NDArray[np.uint8]) -> tuple[Ima
     now, then = (
         cv2.resize(one, small, interpolation=cv2.INTER_AREA)[rows, columns] for one in (picture, target)
     )
+    # Nearly black or overexposed places say nothing of a ratio.
     lit = ((now > 8) & (now < 245) & (then > 8) & (then < 245)).all(1)
     if lit.sum() < 3 * terms.shape[1]:
         return picture, 1.0
@@ -591,6 +603,7 @@ def _evened(picture: Image, target: Image, mask: NDArray[np.uint8]) -> tuple[Ima
     gains = []
     for channel in range(3):
         good = lit.copy()
+        # The second and third rounds leave out what does not fit the plane before.
         for _ in range(3):
             plane = np.linalg.lstsq(terms[good], ratio[good, channel], rcond=None)[0]
             rest = np.abs(ratio[:, channel] - terms @ plane)

@@ -241,6 +241,7 @@ def require_own_video(track: EyeTrack, pictures: Mapping[int, Picture], name: st
 def _eye_patch(picture: Picture, eye: Points) -> Values:
     """An eye's 24 x 16 pixels, freed of place, size, turn and light."""
     along, down, width = eye_axis(eye)
+    # A third of a width above the middle, as the patch is two thirds high.
     corner = (eye[CANTHI[0]] + eye[CANTHI[1]]) / 2 - along * width / 2 - down * width / 3
     matrix = np.column_stack([along * width / 24, down * width / 24, corner])
     patch = cv2.warpAffine(
@@ -250,6 +251,7 @@ def _eye_patch(picture: Picture, eye: Points) -> Values:
         flags=cv2.INTER_AREA | cv2.WARP_INVERSE_MAP,
         borderMode=cv2.BORDER_REPLICATE,
     ).astype(np.float64)
+    # A flat patch has no contrast to divide by.
     return np.asarray((patch - patch.mean()).ravel() / max(float(patch.std()), 1.0))
 
 

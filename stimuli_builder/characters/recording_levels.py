@@ -110,6 +110,7 @@ def rim_weight(crop: tuple[int, int, int, int]) -> NDArray[np.float32]:
     across = np.minimum(np.arange(width), np.arange(width)[::-1]) / rim
     down = np.minimum(np.arange(height), np.arange(height)[::-1]) / rim
     edge = np.clip(np.minimum(down[:, None], across[None]), 0, 1).astype(np.float32)
+    # A cubic, which has no kink at either end of the rim.
     return (edge * edge * (3 - 2 * edge))[..., None]
 
 
@@ -199,6 +200,7 @@ def without_strangers(
         worst = int(odd[np.argmin(values[odd])])
         frames = frames.without(worst)
         values = np.delete(values, worst)
+        # Only the two neighbors of the gap are rebuilt from other frames now.
         for k in (worst - 1, worst):
             if 0 < k < len(values) - 1:
                 rebuilt, recorded = rebuilt_frame(frames, k, crop)
@@ -281,6 +283,7 @@ def measure_levels(
         advance()
     seen, places = np.array(openings), np.array([level.track_closure for level in levels])
     recorded = np.array([level.first == level.second for level in levels]) & np.isfinite(seen)
+    # Without an open and a shut frame that were measured there is no scale.
     if not (recorded[0] and recorded[-1]):
         return MeasuredLevels(places, np.full(len(levels), np.nan), float("nan"))
     opening_px = float(seen[0] - seen[-1])
@@ -353,6 +356,7 @@ def write_recorded_character(
     """
     open_picture = np.clip(np.rint(frames.pictures[0]), 0, 255).astype(np.uint8)
     base = write_picture(folder, "open.webp", open_picture)
+    # Closures must rise: of levels that have the same one after rounding, the first is kept.
     kept = [k for k in range(len(levels)) if k == 0 or measured.closures[k] > measured.closures[:k].max()]
     video = write_level_video(folder, "levels.mkv", [levels[k].crop for k in kept])
     declaration = Declaration(

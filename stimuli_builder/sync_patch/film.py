@@ -41,6 +41,7 @@ def fields_of_number(number: int) -> NDArray[np.bool_]:
     bool array (9,)
     """
     number %= NUMBERS
+    # Gray code: only one field of the code changes from frame to frame.
     code = number ^ (number >> 1)
     white = np.empty(FIELDS, np.bool_)
     white[CODE_FIELDS] = [(code >> bit) & 1 == 1 for bit in range(len(CODE_FIELDS))]
@@ -68,6 +69,7 @@ def read_numbers(brightness: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 _NUMBER_OF = {fields_of_number(number).tobytes(): number for number in range(NUMBERS)}
+# All white means none: the frame whose code is all white is even, and its parity field is black.
 _NUMBER_OF[np.ones(FIELDS, np.bool_).tobytes()] = NO_FRAME
 
 
@@ -102,6 +104,7 @@ def range_of(pictures: Iterable[Grey]) -> Grey:
 def candidates(change: Grey) -> list[Corners]:
     """Four-cornered places that change as a whole, the largest first; corners in clockwise order."""
     level = RANGE_SHARE * float(change.max())
+    # Closed, so that thin lines between fields do not divide the patch.
     closed = cv2.morphologyEx((change >= level).astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
     outlines, _ = cv2.findContours(closed, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     quads = []
@@ -125,6 +128,7 @@ def brightness(picture: Grey, corners: Corners) -> NDArray[np.float64]:
 
 def _clockwise(corners: Corners) -> Corners:
     around = corners - corners.mean(axis=0)
+    # Rows grow downwards, so that rising angles go clockwise.
     return corners[np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
 
 

@@ -66,6 +66,7 @@ class PlayOnScreen:
     def late_ms(self) -> list[float]:
         """How much later than the others each frame came, against the clip's own times."""
         delays = np.array([onset.at_ms - 1000 * onset.frame / self.fps for onset in self.onsets])
+        # Against the median, so that a single late frame does not move the others.
         return [float(late) for late in delays - np.median(delays)]
 
 
@@ -110,6 +111,7 @@ def _parts(numbers: NDArray[np.int64]) -> list[slice]:
     return [
         slice(int(start), int(end) + 1)
         for start, end in pairwise(white)
+        # Between two white pictures there may be unreadable ones alone.
         if (numbers[start + 1 : end] >= 0).any()
     ]
 
@@ -118,7 +120,9 @@ def _onsets(times_ms: NDArray[np.float64], numbers: NDArray[np.int64]) -> tuple[
     """Each frame's onset by equation (1), and when the clip was over."""
     onsets: list[Onset] = []
     last_ms = float(times_ms[0])
+    # The first and the last picture are white.
     for at_ms, number in zip(times_ms[1:-1], numbers[1:-1], strict=True):
+        # It was taken while the patch changed, and lies within the uncertainty of the onset.
         if number == UNREADABLE:
             continue
         frame = _unwrapped(int(number), onsets)
@@ -146,6 +150,7 @@ def _rate(cut: Sequence[Sequence[Onset]]) -> float:
     if not steps:
         raise InputError("expected a clip of at least two frames, found one: add its rate with --fps")
     seen = 1000 / float(np.median(steps))
+    # By ratio: 30 and 60 are as far apart as 60 and 120.
     return min(RATES, key=lambda rate: abs(np.log(rate / seen)))
 
 

@@ -200,8 +200,7 @@ class TrackSummary:
     def count(self, frame: TrackedFrame) -> None:
         """Take in the next frame's outcome."""
         if frame.status in ("doubtful", "lost"):
-            # The words before the first number or bracket: reasons that differ in figures alone are of one
-            # kind.
+            # Words before the first number or bracket: reasons that differ in figures alone are one kind.
             kind = (frame.status, re.split(r"[:(]|\d", frame.reason)[0].strip())
             number, first, whole = self.reasons.get(kind, (0, self.frames, frame.reason))
             self.reasons[kind] = (number + 1, first, whole)
