@@ -146,11 +146,13 @@ def _cells_of(data: ModelData, margin: Sequence[str]) -> Iterator[tuple[dict[str
     for at in product(*(range(sizes[factor]) for factor in margin)):
         weights: Floats = np.ones(1)
         for factor, names in zip(data.factors, data.levels, strict=True):
+            # Levels of other factors weigh the same, however many ratings they have.
             inside = np.full(len(names), 1 / len(names))
             if factor in margin:
                 inside = np.eye(len(names))[at[margin.index(factor)]]
             weights = np.asarray(np.kron(weights, inside))
         row = np.zeros(width)
+        # Columns of covariates stay 0, which is their mean.
         row[: data.fixed.shape[1]] = weights @ data.fixed
         levels = dict(zip(data.factors, data.levels, strict=True))
         yield {factor: levels[factor][k] for factor, k in zip(margin, at, strict=True)}, row

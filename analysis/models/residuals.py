@@ -96,12 +96,14 @@ def ordinal_checks(data: OrdinalData, p: Parameters) -> ResidualChecks:
         fitted = predictor(of.u, of.v)
         low, high = (special.expit(edges[of.data.category + step] - fitted) for step in (0, 1))
         inside = low + random.random(len(fitted)) * (high - low)
+        # The quantiles of 0 and 1 are infinite.
         return fitted, np.asarray(special.ndtri(np.clip(inside, 1e-15, 1 - 1e-15)), dtype=np.float64)
 
     fitted, observed = drawn(likelihood)
     sets = [observed]
     for _ in range(_simulations(len(fixed), SIMULATIONS_ORDINAL)):
         eta = predictor(random.normal(size=likelihood.u.shape), random.normal(size=likelihood.v.shape))
+        # The category is the number of thresholds below the latent value.
         category = np.searchsorted(p.thresholds, eta + random.logistic(size=len(eta)))
         sets.append(drawn(LaplaceLikelihood(replace(data, category=category)))[1])
     return _checks(fixed, fitted, np.stack(sets), observed)
@@ -126,6 +128,7 @@ def _checks(fixed: Floats, fitted: Floats, sets: Floats, residuals: Floats) -> R
     residual, and the correlation (Spearman's, its size) of residuals' sizes with the fixed effects.
     """
     number, n = len(sets) - 1, len(fixed)
+    # In the middle of their steps: no rank is 0 or 1.
     scaled = (np.argsort(np.argsort(sets, axis=0), axis=0) + 0.5) / (number + 1)
     steps = np.arange(n) / n
     ordered = np.sort(scaled, axis=1)
@@ -138,6 +141,7 @@ def _checks(fixed: Floats, fitted: Floats, sets: Floats, residuals: Floats) -> R
         away = spread - spread.mean(axis=1, keepdims=True)
         correlation = away @ centred / np.sqrt((away**2).sum(axis=1) * (centred**2).sum())
         statistics.append(("spread along fixed effects (|r|)", np.abs(correlation)))
+    # The observed data set counts as well, so that p is never 0.
     tests = tuple(
         ResidualTest(name, float(values[0]), float(np.mean(values >= values[0] - 1e-12)))
         for name, values in statistics

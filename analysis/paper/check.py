@@ -44,6 +44,7 @@ def possible(study: PrintedStudy, means: Sequence[PrintedMean]) -> bool:
     rounded = [PrintedInterval.of(mean.mean) for mean in means]
     low, high = np.array([float(r.low) for r in rounded]), np.array([float(r.high) for r in rounded])
     room = np.ones((len(means), 1))
+    # Room below the upper end alone: the lower end itself rounds to the figure.
     upper = np.hstack([weights, room])
     lower = np.hstack([-weights, np.zeros_like(room)])
     bounds = [study.scale or (None, None)] * len(cells) + [(None, 1.0)]
@@ -258,6 +259,7 @@ def _largest_sd(study: PrintedStudy, mean: float) -> float:
     """SD of N values on a scale with this mean, if all sat at its ends (Bhatia & Davis 2000)."""
     low, high = study.scale or (mean, mean)
     n = study.participants
+    # A mean off the scale leaves no room for a spread.
     return math.sqrt(max(0.0, (mean - low) * (high - mean)) * n / (n - 1))
 
 
@@ -269,7 +271,9 @@ def _correlations(study: PrintedStudy) -> Iterator[Finding]:
         if len(levels) != 2 or len(means) != 2 or test is None or float(test.f) <= 0:
             continue
         first, second = (float(m.error or 0) for m in means)
+        # F is the square of the t of the difference, so that this is its standard error.
         difference = (float(means[0].mean) - float(means[1].mean)) / math.sqrt(float(test.f))
+        # An SE printed as 0 says nothing of a correlation.
         if not first * second:
             continue
         r = (first**2 + second**2 - difference**2) / (2 * first * second)

@@ -83,6 +83,7 @@ def _p(kind: Kind, df: tuple[float, ...], value: float) -> float:
     if kind == "chi2":
         return float(special.chdtrc(df[0], value))
     if kind == "r":
+        # An r of 1 would divide by zero.
         r = min(value, 1 - 1e-12)
         return float(2 * special.stdtr(df[0], -r * np.sqrt(df[0] / (1 - r * r))))
     return float(2 * special.ndtr(-value))
@@ -193,6 +194,7 @@ def check_text(text: str) -> TextCheck:
     all_one_tailed = bool(_ALL_ONE_TAILED.search(text))
     statistics, covered = [], []
     for match, following in zip_longest(matches, matches[1:]):
+        # Not beyond the next statistic, whose p is another.
         end = min(match.end() + REACH, following.start() if following else len(text))
         tail = own_clause(text[match.end() : end].split("\n\n")[0])
         before = _SENTENCE_END.split(text[max(0, match.start() - REACH) : match.start()])[-1]
@@ -285,6 +287,7 @@ def _best(p: re.Match[str], ranges: list[tuple[float, float]]) -> tuple[float, f
 
 
 def _is_corrected(text: str) -> bool:
+    # Uncorrected and unadjusted say the opposite.
     return any(not match[0].lower().startswith("un") for match in _CORRECTION.finditer(text))
 
 

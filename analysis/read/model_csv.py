@@ -133,6 +133,7 @@ def header_and_numbers(path: Path) -> tuple[tuple[str, ...], frozenset[str]]:
     of_numbers = set()
     for name in table.header:
         texts = pd.Series(table.columns[name].cat.categories.astype(str))
+        # A comma may be the decimal sign.
         values = pd.to_numeric(texts[~texts.isin(MISSING_MARKS)].str.replace(",", "."), errors="coerce")
         if len(values) and values.notna().all():
             of_numbers.add(name)

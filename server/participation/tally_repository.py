@@ -36,6 +36,7 @@ _SHOWN_PLAYS = (
         & (AssignedTrial.trial_index == Rating.trial_index),
     )
     .join(StudyRun, StudyRun.id == Rating.study_run_id)
+    # Outer, since an attention check has no clip.
     .outerjoin(
         TrialClip,
         (TrialClip.study_run_id == Rating.study_run_id) & (TrialClip.trial_index == Rating.trial_index),

@@ -94,12 +94,14 @@ class Versions:
 
     def get(self, source: Session | Connection, version_id: int) -> LoadedVersion:
         """The version with this id, from memory or the database."""
+        # Read without the lock: a version never changes, and at worst two threads load the same one.
         version = self._loaded.get(version_id)
         if version is None:
             session = source if isinstance(source, Session) else Session(source)
             version = _load(session, version_id)
             with self._lock:
                 while len(self._loaded) >= _MAX_KEPT:
+                    # The first that was loaded goes first, as a dict keeps the order of insertion.
                     del self._loaded[next(iter(self._loaded))]
                 self._loaded[version_id] = version
         return version

@@ -33,6 +33,7 @@ CREASE = 0.085
 @compiled
 def lookup(texture, row, column):
     """Bilinear sample, edges repeated."""
+    # Just inside the last row and column, so that the next ones exist.
     row = min(max(row, 0.0), texture.shape[0] - 1.001)
     column = min(max(column, 0.0), texture.shape[1] - 1.001)
     r, c = int(row), int(column)

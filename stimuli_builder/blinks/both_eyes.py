@@ -55,6 +55,7 @@ def _winks_s(eye: EyeBlinks, rejected: Collection[tuple[str, int]]) -> list[floa
     if eye.recognised is None:
         return []
     accepted = [blink.minimum_s for blink in eye.blinks if (blink.column, blink.number) not in rejected]
+    # Half a frame: the same moment but for rounding.
     within_s = 0.5 / eye.series.fps
     return [wink for wink in eye.recognised.winks_s if any(abs(wink - one) < within_s for one in accepted)]
 

@@ -66,6 +66,7 @@ def _parted(events: Sequence[LidEvent], smooth: Array, fps: float) -> list[tuple
         if between.size < 3 or not np.isfinite(between).any():
             continue
         widest = (first.frame + int(np.nanargmax(between))) / fps
+        # From `parted`, since its onset may have moved with the blink before.
         parted[index] = (replace(parted[index][0], end_s=widest), True)
         parted[index + 1] = (replace(second, onset_s=widest), True)
     return parted
@@ -74,6 +75,7 @@ def _parted(events: Sequence[LidEvent], smooth: Array, fps: float) -> list[tuple
 def _labelled(
     event: LidEvent, touches: bool, smooth: Array, fps: float, options: LabelOptions
 ) -> LabelledBlink | None:
+    # A frame on either side of the deepest at least, whatever the fitted times round to.
     onset = max(0, min(round(event.onset_s * fps), event.frame - 1))
     end = min(smooth.size - 1, max(round(event.end_s * fps), event.frame + 1))
     if not onset < event.frame < end or not np.isfinite(smooth[onset : end + 1]).all():
@@ -177,6 +179,7 @@ def _moved(series: BlinkSeries, blink: LabelledBlink, edges: tuple[int, int] | N
         )
     event = blink.event
     if event is not None:
+        # A fit of the former phases does not hold for the new ones.
         event = replace(event, onset_s=onset / series.fps, end_s=end / series.fps, fit=None, is_moved=True)
     return replace(blink, onset=onset, end=end, event=event)
 

@@ -127,6 +127,7 @@ def turning_frame(smooth: Array, onset: int, lowest: int, end: int, tolerance: f
     if not np.isfinite(reach).all():
         return lowest
     closing, opening = np.diff(reach, axis=1)[:, 0]
+    # Equation (1), with t_c and t_o counted from the lowest frame.
     turn = lowest - reach[0, 0] + reach[:, 0].sum() * closing / (closing + opening)
     alike = np.arange(int(np.ceil(lowest - reach[0, 0])), int(lowest + reach[1, 0]) + 1)
     alike = alike[smooth[alike] <= smooth[lowest] + tolerance * amplitude]
@@ -216,6 +217,7 @@ class _Piece:
         self.smooth = box_filter(distance, scaled_frames(options.filter_frames, fps))
         self.opening = _local_opening(self.smooth, round(scaled_frames(options.search_frames, fps)))
         gradient = box_filter(np.gradient(self.smooth), scaled_frames(options.gradient_frames, fps))
+        # Per frame of 300 fps, as the limits are.
         self.steps = np.abs(gradient) * (fps / PAPER_FPS)
         self.options, self.is_px = options, is_px
         self.half_window = round(scaled_frames(options.gradient_frames, fps) / 2)
@@ -252,6 +254,7 @@ class _Piece:
         """Minima at least `minimum_depth` of the local opening deep, and no mere ripple of a deeper one."""
         relative = self.smooth / self.opening
         depth = self.options.minimum_depth
+        # Minima are peaks of -r, and -r >= depth - 1 says that r has fallen by `depth`.
         minima, _ = find_peaks(-relative, height=depth - 1, prominence=depth / 2)
         return [int(minimum) for minimum in minima]
 
@@ -303,4 +306,5 @@ def _local_opening(smooth: Array, reach: int) -> Array:
     stride = max(1, min(8, reach // 20))
     coarse = percentile_filter(smooth[::stride], 90, size=2 * (reach // stride) + 1, mode="nearest")
     opening = np.interp(np.arange(smooth.size), np.arange(coarse.size) * stride, coarse)
+    # An opening of 0 would divide by zero.
     return np.maximum(opening, 1e-9)

@@ -100,6 +100,7 @@ def blinks_frame(
     frame = pd.DataFrame(rows, columns=list(BLINK_COLUMNS))
     numbers = [field.name for field in fields(MeasuredBlink) if field.type in (float, "float")]
     numbers += ["partner_lag_ms", "partner_closure"]
+    # Nullable, so that numbers stay whole where a partner is missing.
     frame["partner"] = frame["partner"].astype("Int64")
     truths = ["complete", "plausible", "accepted"]
     frame[truths] = frame[truths].astype(bool)  # of no rows too
@@ -179,6 +180,7 @@ def _spreads(rows: pd.DataFrame) -> dict[str, dict[str, float]]:
         "peak_velocity_to_amplitude_per_s": closing / rows["amplitude"],
     }
     spreads = {name: _spread(values.to_numpy()) for name, values in measures.items()}
+    # Of every blink: one that is left out would join two intervals into one.
     return spreads | {"interval_s": _spread(np.diff(every["minimum_s"].to_numpy()))}
 
 

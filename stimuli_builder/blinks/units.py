@@ -143,6 +143,7 @@ def _by_rule(table: pd.DataFrame, rule: str, path: Path) -> Scale:
         )
     points = table[names].to_numpy(dtype=np.float64).reshape(len(table), -1, 9, 2)
     if rule == "inter-ocular":
+        # The middle of the canthi and not of all points, which a blink would move.
         middles = (points[:, :, 0] + points[:, :, 5]) / 2
         length, true = np.hypot(*(middles[:, 1] - middles[:, 0]).T), INTER_OCULAR_MM
     else:
@@ -167,6 +168,7 @@ def closure_course(series: BlinkSeries, closed_distance: float) -> Array:
 
 def lid_degrees(distance_mm: Array) -> Array:
     """Rotation of the upper lid in degrees that opens the eye by a distance: 2 asin(d / (2 R)), R = 12 mm."""
+    # A distance above the diameter of the ball has no angle.
     half = np.arcsin(np.clip(distance_mm / (2 * LID_RADIUS_MM), 0, 1))
     return np.asarray(np.degrees(2 * half))
 

@@ -52,6 +52,7 @@ class BuildState:
             key = clip.inputs.get(RENDER_KEY)
             if key:
                 state._built[key] = Built(key, clip.file, clip.sha256, clip.bytes, clip.frames)
+        # After the manifest, since the unfinished build is the newer one.
         for built in _state_lines(folder / STATE_NAME):
             state._built[built.input_hash] = built
         return state

@@ -69,6 +69,7 @@ def _check_eye(where: str, eye: Points, first: int) -> None:
             raise InputError(
                 f"{where}: points {first + a + 1} and {first + b + 1} cross; check the point order"
             )
+    # Sorted, since labels may wobble within the tolerance and `np.interp` needs rising numbers.
     steps = np.argsort(upper)
     upper_y = np.interp(sign * x[6:9], upper[steps], y[:6][steps])
     crossed = np.flatnonzero(upper_y - y[6:9] > CROSSING_TOLERANCE)
@@ -161,6 +162,7 @@ def load_labels(
 
 
 def _document(path: Path) -> dict[str, Any]:
+    # JSON would keep the last of two equal names and say nothing.
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         seen = dict(pairs)
         if len(seen) < len(pairs):
@@ -182,6 +184,7 @@ def _document(path: Path) -> dict[str, Any]:
 
 def _size(path: Path, document: dict[str, Any]) -> tuple[int, int]:
     size = document.get("image_size_px")
+    # By `type`, since `isinstance` takes true and false for whole numbers.
     whole = isinstance(size, list) and len(size) == 2 and all(type(side) is int and side > 0 for side in size)
     if size is None:
         raise InputError(f"{path}: 'image_size_px' is missing; expected [width, height] of the video")
@@ -219,6 +222,7 @@ def _frames(path: Path, data: object, fewest: int) -> dict[int, Points]:
     frames: dict[int, Points] = {}
     for key, points in data.items():
         number = _number(path, key)
+        # Names such as 7 and 07 are different texts and one number.
         if number in frames:
             raise InputError(f"{path}: frame {number} occurs twice; keep one set of points for each frame")
         frames[number] = _points(f"{path}: frame {number}", points)

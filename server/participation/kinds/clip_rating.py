@@ -51,6 +51,7 @@ def validate(experiment: Experiment, part: Part, rating: RatingIn) -> None:
         if name not in asked:
             raise NoSuchScale(f"Expected answers on the scales {', '.join(asked)}; got one on {name}.")
     missing = [name for name in asked if name not in answer.answers or not answer.answers[name].given]
+    # An attention check has no clip that could fail, so that it never goes without.
     failed = len(missing) == len(asked) and part != "attention"
     if missing and not failed:
         raise RatingMissing(
@@ -86,6 +87,7 @@ def judge(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingIn) -> 
         assigned = {role: loaded.clips[clip] for role, clip in clips.items()}
         return judge_several(rules, assigned, sum(clip.frames for clip in assigned.values()), rating)
     clip = loaded.clips[clips["shown"]]
+    # Each view shows all frames of the clip.
     frames = clip.frames * clip_rating_of(loaded.experiment).views
     return judge_play(rules, playback_of(rating.playback), clip.sha256, frames, clip.fps, rated=rated)
 
@@ -108,6 +110,7 @@ def simulated(
 
 
 def _simulated_value(scale: RatedScale, liking: float, rng: random.Random) -> dict[str, Any]:
+    # A seven-point scale has six steps between its ends.
     middle, unit = (scale.minimum + scale.maximum) / 2, (scale.maximum - scale.minimum) / 6
     value = scale.nearest(middle + (-1 if scale.reverse else 1) * unit * (liking + rng.gauss(0, TRIAL_SD)))
     if scale.not_applicable and rng.random() < NOT_APPLICABLE_SHARE:

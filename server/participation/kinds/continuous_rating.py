@@ -71,10 +71,12 @@ def simulated(
     clip = trial["clips"][0]
     low, high = declared["minimum"], declared["maximum"]
     step = step_frames(clip["fps"], declared["sample_hz"])
+    # A liking is in points of a seven-point scale, which has six steps between its ends.
     level = 0.5 + preference(clip["clip_sha256"]) / 6
     drift, values = 0.0, []
     for sample in range(samples_of(clip["frames"], step)):
         time_s = sample * step / clip["fps"]
+        # Drawn back toward 0, or the wandering would leave the scale in the end.
         drift += rng.gauss(-0.02 * drift, DRIFT_SHARE)
         answered = sum(
             risen_share(time_s - onset - LAG_S) for onset in preference.blinks(clip["clip_sha256"])

@@ -52,6 +52,7 @@ def judge(loaded: LoadedVersion, clips: Mapping[str, int], rating: RatingIn) -> 
     assigned = {role: loaded.clips[clip] for role, clip in clips.items()}
     pair = [clip.frames for role, clip in assigned.items() if role != "reference"]
     in_turn = isinstance(paired_comparison_of(loaded.experiment).presentation, OneAfterTheOther)
+    # The reference is shown alone before the pair, so that its frames add in either case.
     before = assigned["reference"].frames if "reference" in assigned else 0
     return judge_several(rules, assigned, before + (sum(pair) if in_turn else max(pair)), rating)
 

@@ -40,6 +40,7 @@ def span_means(values: Array, centres: Array, edges: Array) -> Array:
     """
     reach = int(np.ceil(np.abs(edges).max())) + 2
     long = np.pad(values, reach, mode="edge")
+    # The integral of straight lines between samples: a span's mean is a difference of two of its values.
     areas = np.concatenate([[0.0], np.cumsum((long[1:] + long[:-1]) / 2)])
     places = np.clip(centres, 0, values.size - 1)[:, None] + reach + edges
     left = np.floor(places).astype(np.int64)
@@ -175,6 +176,7 @@ def level_crossing(depth: Depth, peak: int, level: float, step: int) -> float:
     side = depth.smooth[first : peak + 1][::-1] if step < 0 else depth.smooth[peak : peak + reach]
     below = np.flatnonzero(side < level)
     if not below.size:
+        # The depth never falls so low: the crossing is put at the end of what was searched.
         return float(peak + step * (side.size - 1))
     frame = int(below[0])
     rise = side[frame - 1] - side[frame]
@@ -270,6 +272,7 @@ def _surroundings(c: Candidate, depth: Depth) -> tuple[float, float]:
 def _other_eye_depths(c: Candidate, other: Array | None, deep: float) -> tuple[float, float]:
     if other is None:
         return 0.0, 0.0
+    # One frame either way, as both eyes need not be lowest in the same one.
     part = other[max(0, c.peak - 1) : c.peak + 2]
     if not np.isfinite(part).any():
         return 0.0, 0.0

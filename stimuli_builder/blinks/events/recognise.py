@@ -281,6 +281,7 @@ def _event(kind: str, probability: float, candidate: Candidate, timing: Timing, 
         kind=kind,
         probability=probability,
         frame=piece.start + candidate.peak,
+        # A fitted onset may lie before the piece, where nothing was measured.
         onset_s=max(0.0, timing.onset_s) + shift,
         closed_from_s=max(0.0, timing.closed_from_s) + shift,
         minimum_s=timing.minimum_s + shift,
@@ -299,6 +300,7 @@ def _fit_of(timing: Timing, depth: Depth) -> PhaseFit | None:
     def opening(time_s: float) -> float:
         return float(depth.opening[min(max(0, round(time_s * depth.fps)), depth.opening.size - 1)])
 
+    # Depths go back into the unit of the series by the opening about then.
     before, after = timing.fitted.before, timing.fitted.after
     return PhaseFit(
         (1 - before) * opening(timing.onset_s),

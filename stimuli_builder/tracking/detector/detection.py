@@ -131,6 +131,7 @@ class Region(NamedTuple):
 
 def contours_of(eyes: Sequence[Any]) -> Points:
     """What the iris network answers with, as contours (eyes, 16, 2)."""
+    # Both ends of the lower contour are those of the upper one.
     return np.array([[*upper, *lower[1:-1]] for upper, lower, _ in eyes])
 
 
@@ -220,6 +221,7 @@ def _continued(
             if away < NEAR and _like(_width(one), _width(other)):
                 cost[row, column] = away + MISSED * min(looks, MAX_MISSED)
     rows, columns = linear_sum_assignment(cost)
+    # Pairs at the cost of `never` are those for which nothing else was left.
     pairs = zip(rows.tolist(), columns.tolist(), strict=True)
     return {column: row for row, column in pairs if cost[row, column] < never}
 
