@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,24 +16,55 @@ from tests.conftest import REPOSITORY
 
 PROGRAMS = {"stimuli": get_command(stimuli), "server": get_command(server), "analysis": get_command(analysis)}
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
-FENCED = re.compile(r"^\s*```(?:sh|text|console)?\n(.*?)^\s*```$", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(r"^[ ]*```([^\n`]*)\n(.*?)^[ ]*```[ ]*$", re.MULTILINE | re.DOTALL)
+SHELL = {"", "sh", "text", "console"}
 INLINE = re.compile(r"(?<!`)`((?:stimuli|server|analysis) [^`\n]+)`")
+COMMAND = re.compile(r"\s*(stimuli|server|analysis) [a-z-]")
+# what is between quotation marks, such as a formula with |, stays whole
+PIECE = re.compile(r"(?:'[^']*'|[^'|;&]|&(?!&)|'(?![^']*'))+")
+
+
+@dataclass(frozen=True)
+class PrintedLine:
+    """What a reader copies at once: a line of a block with what continues it, or code in running text."""
+
+    line: int
+    text: str
+    inline: bool
+
+    def commands(self) -> list[str]:
+        """The commands of the three programs in it, `$(...)` written as X."""
+        lines = self.text.replace("\\\n", " ").splitlines()
+        pieces = self.text.split("&&") if self.inline else [p for line in lines for p in PIECE.findall(line)]
+        return [re.sub(r"\$\([^)]*\)", "X", piece).strip() for piece in pieces if COMMAND.match(piece)]
+
+
+def printed_lines(text: str) -> list[PrintedLine]:
+    """Lines of shell blocks, continued lines and loops joined, and code in running text, in order."""
+    printed = []
+    for block in BLOCK.finditer(text):
+        if block[1].strip() in SHELL:
+            begins = text.count("\n", 0, block.start(2)) + 1
+            joined = ""
+            for number, line in enumerate(block[2].splitlines(), begins):
+                first = number - joined.count("\n")
+                joined += line.strip()
+                if joined.endswith("\\") or (joined.startswith("for ") and joined.split()[-1] != "done"):
+                    joined += "\n"
+                    continue
+                printed.append(PrintedLine(first, joined, inline=False))
+                joined = ""
+    without_blocks = BLOCK.sub(lambda block: "\n" * block[0].count("\n"), text)
+    printed += [
+        PrintedLine(without_blocks.count("\n", 0, code.start()) + 1, code[1], inline=True)
+        for code in INLINE.finditer(without_blocks)
+    ]
+    return sorted(printed, key=lambda line: line.line)
 
 
 def command_lines(text: str) -> list[str]:
-    """Lines of code blocks, continued lines joined, and commands in running text."""
-    lines = [
-        line.strip() for block in FENCED.findall(text) for line in block.replace("\\\n", " ").splitlines()
-    ]
-    # what is between quotation marks, such as a formula with |, stays whole
-    pieces = re.compile(r"(?:'[^']*'|[^'|;&]|&(?!&)|'(?![^']*'))+")
-    commands = [piece for line in lines for piece in pieces.findall(line)]
-    inline = [piece for code in INLINE.findall(text) for piece in code.split("&&")]
-    return [
-        re.sub(r"\$\([^)]*\)", "X", command).strip()
-        for command in [*commands, *inline]
-        if re.match(r"\s*(stimuli|server|analysis) [a-z-]", command)
-    ]
+    """The commands of a page, in order."""
+    return [command for line in printed_lines(text) for command in line.commands()]
 
 
 def fault_of(line: str) -> str | None:
