@@ -143,10 +143,18 @@ def runnable_lines(page: Path) -> list[PrintedLine]:
     return lines
 
 
+NOT_YET = (
+    *("analysis", "blink-engine", "blinks", "clips", "models", "server", "tracking"),
+    *("analyze-ratings", "animate-blinks", "check-participants", "many-recordings", "measure-blinks"),
+    *("plan-the-sample", "replicate-studies", "scale-up", "share-a-study", "use-r-python-spss"),
+    *("clip_rating", "continuous_rating", "paired_comparison", "threshold"),
+)
+"""Pages whose commands have not yet been seen to run, one after another, in this folder (issue 51)."""
 RUN_PAGES = [
     page
     for page in PAGES
-    if not set(DECIDED) & set(page.parts) and any(line.commands() for line in runnable_lines(page))
+    if not {*DECIDED, *NOT_YET} & {*page.parts, page.stem}
+    and any(line.commands() for line in runnable_lines(page))
 ]
 
 QUICK = ("erase-a-person", "export-data", "recruit")
