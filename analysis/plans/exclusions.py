@@ -95,6 +95,7 @@ class RuleVerdicts:
             marked = self.trials[rule]
             if marked is None:
                 continue
+            # Trials that a rule before has left out are not counted again.
             bad = kept & marked
             if bad.any():
                 runs = int(self.main["run"][bad].nunique())
@@ -167,6 +168,7 @@ def _not_applicable(rows: pd.DataFrame) -> NDArray[np.bool_]:
 
 
 def _with_run(rows: pd.DataFrame) -> pd.DataFrame:
+    # Where a table names no runs, every participant has one.
     return rows if "run" in rows.columns else rows.assign(run=rows["participant"])
 
 

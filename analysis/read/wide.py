@@ -76,6 +76,7 @@ def copied_block(rows: pd.DataFrame) -> CopiedBlock | None:
     for distance in distances:
         equal = codes[distance:] == codes[:-distance]
         edges = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]).astype(np.int8)))
+        # Longer than its distance, a block would overlap with its copy.
         starts, lengths = edges[::2], np.minimum(edges[1::2] - edges[::2], distance)
         if not lengths.size:
             continue
@@ -104,6 +105,7 @@ def _usual_rate(lengths: Codes, longest: int, places: int) -> float:
     """How often rows agree at this distance, by the runs that are clearly shorter than the longest."""
     long = 10 * lengths >= 9 * longest
     left = places - int(lengths[long].sum())
+    # Laplace's rule of succession, which gives neither 0 nor 1.
     return (int(lengths[~long].sum()) + 1) / (max(left, 0) + 2)
 
 
@@ -131,6 +133,7 @@ def _distances(codes: Codes) -> list[int]:
     n = len(codes)
     first = np.full(int(codes.max()) + 1, n)
     np.minimum.at(first, codes, np.arange(n))
+    # A stable sort keeps equal rows in their order: the one before each is the latest that is equal.
     order = np.argsort(codes, kind="stable")
     before = np.full(n, -1)
     same = codes[order][1:] == codes[order][:-1]
@@ -263,6 +266,7 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
         )
         for name, levels_of_column in levels.items()
     ]
+    # The cells of each person together, in the order of the columns.
     rows = pd.concat(parts).sort_index(kind="stable").reset_index(drop=True)
     copies = said_of_copies(read.rows, [str(line) for line in read.lines])
     decisions = (*read.decisions, *([copies] if copies else []))
@@ -290,6 +294,7 @@ def _refuse_pattern(pattern: str, factors: tuple[str, ...]) -> None:
 def _levels(pattern: str, name: str) -> tuple[str, ...] | None:
     """The levels that a column's name holds; None where it does not fit."""
     literal = _PLACEHOLDER.split(pattern)[::2]
+    # By the shortest and by the longest levels: where both agree, the name fits in one way.
     short, long = (
         re.fullmatch(pattern_of_level.join(re.escape(part) for part in literal), name)
         for pattern_of_level in ("(.+?)", "(.+)")

@@ -117,6 +117,7 @@ def _cell_answers(
 ) -> dict[ClipSpec, list[int]]:
     repeats, unit = experiment.blocks.repeats, (steps.high - steps.low) / WIDTH
     offsets = unit * np.repeat([own[exemplar_key(experiment, spec)] for spec in specs], repeats)
+    # Centered, so that the cell's mean stays what its total says.
     means = total / len(offsets) + offsets - offsets.mean()
     drawn = split_sum(total, means, steps.low, steps.high, rng)
     return {spec: drawn[i * repeats : (i + 1) * repeats].tolist() for i, spec in enumerate(specs)}

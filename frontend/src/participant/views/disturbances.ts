@@ -76,6 +76,7 @@ export function watchDisturbances(clip: HTMLElement, before: Layout): { stop: ()
     // Kept with the layout: a trial's later clips and plays do not count the same leaving again.
     before.fullscreenElement = document.fullscreenElement;
   };
+  // The window may be too small from the start, without any event.
   look();
   window.addEventListener("resize", look, { signal });
   window.addEventListener("scroll", look, { signal, passive: true });
@@ -83,6 +84,7 @@ export function watchDisturbances(clip: HTMLElement, before: Layout): { stop: ()
   document.addEventListener("fullscreenchange", look, { signal });
   return {
     stop() {
+      // Once more, as the event of a change may not have come yet.
       look();
       own.abort();
       const focus_lost = focus.stop();

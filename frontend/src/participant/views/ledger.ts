@@ -160,7 +160,9 @@ export function applyViews(trials: readonly TrialInfo[], sent: readonly ViewIn[]
     if (!trial) continue;
     const play = view.play ?? view.number;
     trial.views_begun = Math.max(trial.views_begun, view.number);
+    // The end of a view has the id of its beginning, and takes its place.
     trial.views = trial.views.filter((one) => one.id !== view.id);
+    // Of a play that has its answer no view is asked for any more.
     if (play <= trial.plays_done) continue;
     trial.views.push({
       id: view.id,

@@ -13,6 +13,7 @@ export async function watchBothAndRate(session: Session, stage: Stage, parameter
   if (before) sayAlreadySeen(session, stage);
   const shown = before ?? (await watch(session, stage, parameters));
   const rating = rate(session, stage);
+  // While the person answers, so that the next trial need not wait.
   if (next) void decodeAll(session, next).catch(() => {});
   const rated = await rating;
   const showings = shown.map(({ showing }) => showing);
@@ -25,6 +26,7 @@ export async function watchBothAndRate(session: Session, stage: Stage, parameter
 async function watch(session: Session, stage: Stage, parameters: TrialParameters): Promise<RolesShown[]> {
   const { trial, play } = parameters;
   const { reference, start, fixation_ms } = declaredRating(session);
+  // The reference first, whatever the order of the trial's clips.
   const clips = ["reference", "shown"].flatMap((role) => trial.clips.filter((clip) => clip.role === role));
   await prepareInTurn(session, stage, trial, clips);
   const key_at_ms = await ready(session, stage, parameters, 1);

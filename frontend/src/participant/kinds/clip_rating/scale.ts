@@ -97,6 +97,7 @@ export async function askInOrder(container: HTMLElement, trial: ShownClipRating,
 /** The keys of a screen end with it. */
 async function withOwnKeys<T>(signal: AbortSignal, ask: (signal: AbortSignal) => Promise<T>): Promise<T> {
   const own = new AbortController();
+  // The listener ends with its screen, or each screen would leave one on the shared signal.
   signal.addEventListener("abort", () => own.abort(), { signal: own.signal });
   try {
     return await ask(own.signal);
@@ -203,9 +204,11 @@ class ScalesView {
 
   private choose(block: Block, value: number | null, time_stamp: number): void {
     if (this.over) return;
+    // Event times count from the page's time origin; stored times are absolute.
     const at_ms = performance.timeOrigin + time_stamp;
     const { chosen, widget, not_applicable } = block;
     if (chosen && chosen.value !== value) this.changes += Number(widget.settles || value === null || at_ms - chosen.at_ms > REST_MS);
+    // The same answer pressed again keeps the time of its first press.
     if (!chosen || chosen.value !== value) block.chosen = { value, at_ms };
     widget.show(value);
     not_applicable?.setAttribute("aria-pressed", String(value === null));

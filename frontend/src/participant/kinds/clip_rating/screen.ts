@@ -51,6 +51,7 @@ async function watchAndRate(session: Session, stage: Stage, parameters: TrialPar
   const showings = before.length < declaredRating(session).views ? await watch(session, stage, parameters, before) : before;
   if (showings === before) sayAlreadySeen(session, stage);
   const rating = rate(session, stage);
+  // While the person answers, so that the next trial need not wait.
   if (next) void prepareClip(session, next, null).catch(() => {});
   const rated = await rating;
   const body = bodyOf(session, parameters, showings, rated);
@@ -94,6 +95,7 @@ function attentionCheck(session: Session): PluginClass<{ trial: TrialInfo }> {
     show: async (display, parameters) => (await loaded).check(session, display, parameters.trial),
     async simulate(parameters) {
       const { check_scale } = declaredRating(session);
+      // The prompt has the number to press between two stars on either side.
       const response = Number(/\*\*(\d+)\*\*/.exec(parameters.trial.prompt ?? "")?.[1] ?? check_scale.minimum);
       const answers = { [check_scale.name]: { response } };
       const rated = { answers, at_ms: {}, answered_at_ms: absoluteNow(), changes: 0, comment: null };

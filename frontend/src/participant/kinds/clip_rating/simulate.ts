@@ -21,6 +21,7 @@ export async function simulatedRating(session: Session, { trial, play }: TrialPa
 function anyOf(scale: Scale): number {
   const step = scale.type === "slider" ? scale.step : 1;
   const steps = Math.round((scale.maximum - scale.minimum) / step);
+  // Rounded, since steps such as 0.1 do not add up exactly.
   return Number((scale.minimum + step * Math.floor(Math.random() * (steps + 1))).toFixed(6));
 }
 

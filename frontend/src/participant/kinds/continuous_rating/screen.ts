@@ -54,6 +54,7 @@ async function watch(session: Session, stage: Stage, { trial, play, number, tota
   track.focus();
   try {
     const showing = await ledger.unlessBroken(shown);
+    // The answer does not wait for it: what the page does next is not on the disk's time.
     void ledger.end([{ roles: ["shown"], showing }]);
     if (showing.focus_lost > 0) session.events.add("focus_lost", { trial_index: trial.trial_index });
     const step_frames = stepFrames(showing.fps, declared.sample_hz);

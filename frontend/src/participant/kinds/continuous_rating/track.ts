@@ -53,6 +53,7 @@ export function traceOf(
 function timeOf(frame: number, drawn: readonly (readonly [number, number])[], fps: number): number {
   const after = drawn.findIndex(([index]) => index >= frame);
   const [later, earlier] = [drawn[after], drawn[after < 0 ? drawn.length - 1 : after - 1]];
+  // A frame before the first that was drawn is dated back at the clip's rate.
   if (later && (later[0] === frame || !earlier)) return later[1] - ((later[0] - frame) * 1000) / fps;
   if (!earlier) return 0;
   if (!later) return earlier[1] + ((frame - earlier[0]) * 1000) / fps;
@@ -106,6 +107,7 @@ export function makeTrack(declared: ShownContinuousRating, language: string, sig
 function nudge(event: KeyboardEvent, input: HTMLInputElement, by: number, noted: (at_ms: number) => void): void {
   const direction = DIRECTION[event.key];
   if (direction === undefined) return;
+  // Else the browser would move the slider by its own step as well.
   event.preventDefault();
   input.valueAsNumber += direction * by;
   noted(performance.timeOrigin + event.timeStamp);
@@ -117,6 +119,7 @@ function hold(input: HTMLInputElement, a_ms: number, noted: (at_ms: number) => v
   let since_ms = 0;
   const advance = (now_ms: number): void => {
     if (direction !== 0) {
+      // A frame's time may be earlier than that of a key pressed during it.
       input.valueAsNumber += direction * a_ms * Math.max(0, now_ms - since_ms);
       noted(performance.timeOrigin + now_ms);
     }
@@ -133,6 +136,7 @@ function hold(input: HTMLInputElement, a_ms: number, noted: (at_ms: number) => v
       const pressed = DIRECTION[event.key];
       if (pressed === undefined) return;
       event.preventDefault();
+      // A key that is held down repeats its event.
       if (pressed === direction) return;
       advance(event.timeStamp);
       const resting = direction === 0;
@@ -144,6 +148,7 @@ function hold(input: HTMLInputElement, a_ms: number, noted: (at_ms: number) => v
   document.addEventListener(
     "keyup",
     (event) => {
+      // Another key may have taken over: only the one that moves the slider stops it.
       if (DIRECTION[event.key] !== direction) return;
       advance(event.timeStamp);
       direction = 0;

@@ -85,6 +85,7 @@ function way(session: Session, clipStage: Stage): Way {
   const left = new Promise<never>((_, reject) => {
     taken.signal.addEventListener("abort", () => reject(new OtherWayTaken()));
   });
+  // Where nobody waits for it, the browser would report a rejection that is not handled.
   left.catch(() => {});
   const offered = session.run.checks?.other_way;
   const leave = offered ? button(offered.label, () => taken.abort(), "plain") : null;
@@ -101,6 +102,7 @@ async function watch(session: Session, clipStage: Stage, trial: TrialInfo, other
   const key_at_ms = await Promise.race([start, other.left]);
   const ledger = beginView(session, trial, 1);
   const shown = await ledger.unlessBroken(showOnce(session, clipStage, sha256, key_at_ms, 0, ledger.kept));
+  // The question does not wait for it: what the page does next is not on the disk's time.
   void ledger.end([{ roles: ["shown"], showing: shown }]);
   if (shown.focus_lost > 0) session.events.add("focus_lost", { trial_index: trial.trial_index });
   return shown;
@@ -109,6 +111,7 @@ async function watch(session: Session, clipStage: Stage, trial: TrialInfo, other
 async function ask(session: Session, clipStage: Stage, trial: TrialInfo, left: AbortSignal): Promise<Chosen<string>> {
   const { question, choices } = asked(session, trial);
   const { signal, done } = screenSignal(session);
+  // Keys must not answer any more once the other way is taken.
   left.addEventListener("abort", done);
   const chosen = await askAnswer<string>(clipStage.below, {
     choices: choices.map((label, index) => ({ name: String(index + 1), number: index + 1, label })),

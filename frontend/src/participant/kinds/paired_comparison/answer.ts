@@ -25,6 +25,7 @@ const KEYS = new Map<string, Winner>(
 
 /** The answer a key stands for; null for other keys, and for a tie where none may be given. */
 export function winnerOf(key: string, ties: boolean): Winner | null {
+  // A letter counts with Shift or Caps Lock as well; names of other keys keep their capitals.
   const winner = KEYS.get(key.length === 1 ? key.toLowerCase() : key) ?? null;
   return winner === "tie" && !ties ? null : winner;
 }

@@ -44,6 +44,7 @@ export function layoutOf(
 }
 
 function arranged(arrangement: Arrangement, pixels: Size, shown: Size, gap_px: number): Layout {
+  // Pixels of the clip per CSS px.
   const scale = pixels.width / shown.width;
   const gap = Math.round(gap_px * scale);
   const across = arrangement === "side_by_side" ? pixels.width + gap : 0;
@@ -57,6 +58,7 @@ function arranged(arrangement: Arrangement, pixels: Size, shown: Size, gap_px: n
       { x: 0, y: 0, ...pixels },
       { x: across, y: below, ...pixels },
     ],
+    // Half way to the second clip is the middle of the canvas.
     single: { x: Math.round(across / 2), y: Math.round(below / 2), ...pixels },
   };
 }

@@ -103,6 +103,7 @@ export async function stageFor(session: Session, display: HTMLElement, trial: Tr
   const { px_per_mm } = session.screen;
   const shown = clipSize(session, trial);
   const pixels = { width: trial.width_px ?? shown.width, height: trial.height_px ?? shown.height };
+  // Asked again until it fits: a window may be enlarged too little.
   for (;;) {
     const room = { width: window.innerWidth, height: window.innerHeight };
     const layout = layoutOf(presentation, pixels, shown, room, px_per_mm);

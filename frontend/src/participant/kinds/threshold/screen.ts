@@ -72,6 +72,7 @@ async function watch(session: Session, stage: Stage, parameters: TrialParameters
   const shown = await ledger.unlessBroken(
     showInTurn(session, stage, trial, { clips: trial.clips, gap_ms: declared.gap_ms }, key_at_ms, ledger.kept),
   );
+  // The question does not wait for it: what the page does next is not on the disk's time.
   void ledger.end(shown);
   return shown;
 }
