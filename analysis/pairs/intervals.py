@@ -1,5 +1,6 @@
 """Intervals of abilities: Wald, profile, bootstrap, and for rankings that are watched while they grow."""
 
+import math
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
@@ -107,7 +108,7 @@ def anytime_factor(pairs: FittedPairs) -> float:
         )
     level = ALPHA / (items * (items - 1) / 2)
     tightest = RATERS_TIGHTEST if raters else COMPARISONS_TIGHTEST
-    scaled = t * float(-np.real(special.lambertw(-(level**2) / np.e, -1)) - 1) / tightest
+    scaled = t * float(-np.real(special.lambertw(-(level**2) / math.e, -1)) - 1) / tightest
     return float(np.sqrt((1 + 1 / scaled) * np.log((scaled + 1) / level**2)))
 
 

@@ -61,7 +61,7 @@ def _planned(
     experiment: Experiment, check: CheckName, number: int, seed: int, options: Options
 ) -> PlannedCheck:
     declared = experiment.evidence.motion_checks
-    settings = _settings(experiment, seed, number)
+    settings = _settings(experiment, seed, number, options.base_folder)
     look = look_of(settings, options) if CHECK_KINDS[check].own_look else None
     job = CheckJob(
         check=check,
@@ -78,11 +78,27 @@ def _planned(
     return PlannedCheck(job, round(job.size_px[0] / scale, 4))
 
 
-def _settings(experiment: Experiment, seed: int, number: int) -> RenderSettings:
+UNDECLARED = RenderSettings().character
+"""The character of a study that names none."""
+
+
+def _settings(experiment: Experiment, seed: int, number: int, base: Path | None) -> RenderSettings:
     """How a cell drawn by the seed is rendered: its character, size and rate are the check's."""
     clips = design.clips(experiment)
     drawn = generator("check", seed, number, "cell").integers(len(clips))
-    return design.render_settings(experiment, clips[int(drawn)])
+    settings = design.render_settings(experiment, clips[int(drawn)])
+    if settings.character == UNDECLARED and not _is_there(UNDECLARED, base):
+        # A study of one's own clips declares no character, and the default is no longer shipped.
+        return settings.model_copy(update={"character": "cartoon"})
+    return settings
+
+
+def _is_there(character: str, base: Path | None) -> bool:
+    try:
+        geometry(character, base)
+    except InputError:
+        return False
+    return True
 
 
 def bt709(colour: str) -> tuple[int, int, int]:

@@ -335,9 +335,7 @@ def _patches(
     pictures: list[Picture], shapes: Points, count: int = 5
 ) -> tuple[Picture, NDArray[np.int64], Values]:
     """Eye regions of labeled frames spread over the range of shapes, cut at one common size."""
-    spread = np.ptp(shapes[:, :, 1], axis=1) * 0 + (shapes - shapes.mean(1, keepdims=True)).reshape(
-        len(shapes), -1
-    ).var(1)
+    spread = (shapes - shapes.mean(1, keepdims=True)).reshape(len(shapes), -1).var(1)
     # Evenly over the ranks; where frames are few, a rank that comes twice counts once.
     chosen = np.argsort(spread)[
         np.unique(np.linspace(0, len(shapes) - 1, min(count, len(shapes))).astype(int))

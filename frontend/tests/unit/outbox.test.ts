@@ -40,6 +40,18 @@ describe("outbox", () => {
     expect(paths(got)).toEqual(["/a", "/a", "/a"]);
   });
 
+  it("goes on after an error that nobody expected", async () => {
+    const fake = server();
+    let faults = 2;
+    const send = (...call: Parameters<typeof fake.send>): Promise<Answer> =>
+      faults-- > 0 ? Promise.reject(new TypeError("a fault of the program")) : fake.send(...call);
+    const { outbox, store } = await opened(new IDBFactory(), [], { send });
+    await Promise.all(["/a", "/b"].map((path) => outbox.put("PUT", path, {})));
+    expect(await outbox.drained(1_000)).toBe(true);
+    expect(paths(fake.got)).toEqual(["/a", "/b"]);
+    expect(await store.all()).toHaveLength(0);
+  });
+
   it("sends in the order of putting", async () => {
     const { outbox, got } = await opened(new IDBFactory(), ["silence"]);
     await Promise.all(["/a", "/b", "/c"].map((path) => outbox.put("PUT", path, {})));

@@ -175,3 +175,15 @@ def test_the_command_says_what_it_made(copied: Path, tmp_path: Path) -> None:
 def test_what_cannot_be_asked_is_refused_in_one_line(before: str, after: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         parse_experiment(STUDY.replace(before, after))
+
+
+def test_a_study_of_own_clips_needs_no_character(tmp_path: Path) -> None:
+    text = STUDY.replace('render = { character = "cartoon", width_px = 320, height_px = 120 }\n', "")
+    text = text.replace(", render = { duration_frames = 8 }", "").replace(
+        ", render = { duration_frames = 14 }", ""
+    )
+    study = tmp_path / "own.toml"
+    study.write_text(text, encoding="utf-8")
+    planned = checks.planned_checks(parse_experiment(text), 5, Options(base_folder=tmp_path))
+    assert [one.job.check for one in planned] == ["digit", "direction", "first_eye", "digit", "direction"]
+    assert all(one.width_mm > 0 for one in planned)

@@ -5,7 +5,7 @@
  * be repeated without harm, because the server stores each id once.
  */
 import type { OutboxItem, OutboxStore } from "./store";
-import { BUSY, isTemporary, NetworkError, refusalOf, request, type Answer, type Refused, withinTime } from "../request";
+import { BUSY, isTemporary, refusalOf, request, type Answer, type Refused, withinTime } from "../request";
 import type { Event as RunEvent } from "../../api/schema";
 import { clockTime } from "../measured";
 
@@ -208,9 +208,9 @@ export class Outbox {
       // Any answer that is not temporary is for good, a refusal too: sending it again would block the queue behind it.
       await this.settle(batch, answer);
       return 0;
-    } catch (error) {
-      if (error instanceof NetworkError) return this.failed(null);
-      throw error;
+    } catch {
+      // Whatever went wrong, the record is kept and tried again: an error let through would stop the outbox for good.
+      return this.failed(null);
     }
   }
 

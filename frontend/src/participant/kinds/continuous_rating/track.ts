@@ -123,7 +123,7 @@ function hold(input: HTMLInputElement, a_ms: number, noted: (at_ms: number) => v
       input.valueAsNumber += direction * a_ms * Math.max(0, now_ms - since_ms);
       noted(performance.timeOrigin + now_ms);
     }
-    since_ms = now_ms;
+    since_ms = Math.max(since_ms, now_ms);
   };
   const tick = (now_ms: number): void => {
     if (direction === 0 || signal.aborted) return;
