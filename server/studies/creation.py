@@ -1,6 +1,5 @@
 """New studies and versions: definition and clips are checked and stored, all of it or nothing."""
 
-import shlex
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -311,7 +310,6 @@ def shipped_experiments(settings: Settings) -> list[ShippedExperiment]:
                 toml=text,
                 demonstration=name in DEMOS,
                 clips_ready=(folder / MANIFEST_NAME).is_file(),
-                build=f"stimuli build {name} --out {shlex.quote(str(folder.resolve()))}",
             )
         )
     return experiments

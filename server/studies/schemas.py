@@ -236,7 +236,6 @@ class ShippedExperiment(BaseModel):
     toml: str
     demonstration: bool = Field(description="True for those that are none of the paper's experiments.")
     clips_ready: bool = Field(description="True where `stimuli build` has made its clips on this server.")
-    build: str = Field(description="The command that builds its clips where this server looks for them.")
 
 
 class NewStudy(RequestBody):

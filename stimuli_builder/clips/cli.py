@@ -112,6 +112,10 @@ def build_command(
     quiet: Annotated[
         bool, typer.Option("--quiet-when-current", help="Print nothing if no clip had to be built.")
     ] = False,
+    lines: Annotated[
+        bool,
+        typer.Option("--progress-lines", help="Print '3 of 80' per clip instead of a bar."),
+    ] = False,
 ) -> None:
     """Build the clips of an experiment."""
     from experiments.load import load_experiment
@@ -121,8 +125,8 @@ def build_command(
 
     declared = load_experiment(experiment)
     options = Options(seed=seed, barcode=barcode, base_folder=experiment_folder(experiment))
-    with progress_bar(f"building {declared.name}") as progress:
-        report = build(declared, out, options, Machines(workers, dask), progress)
+    with progress_bar(f"building {declared.name}") as bar:
+        report = build(declared, out, options, Machines(workers, dask), _print_progress if lines else bar)
     if preview:
         from stimuli_builder.clips.preview import write_preview
 
@@ -130,6 +134,10 @@ def build_command(
             print(f"wrote {written}")
     if not (quiet and report.built == 0):
         _print_report(report, out)
+
+
+def _print_progress(done: int, total: int) -> None:
+    print(f"{done} of {total}", flush=True)
 
 
 def _print_report(report: "Report", out: Path) -> None:

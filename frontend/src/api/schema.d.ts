@@ -348,6 +348,16 @@ export interface paths {
   };
   get: operations["list_clips"];
  };
+ "/api/admin/experiments/builds": {
+  parameters: {
+  };
+  get: operations["list_clip_builds"];
+ };
+ "/api/admin/experiments/{experiment}/builds": {
+  parameters: {
+  };
+  post: operations["begin_clip_build"];
+ };
  "/api/admin/uploads": {
   parameters: {
   };
@@ -938,6 +948,16 @@ export interface components {
    */
    type: "choice";
    options: components["schemas"]["Option"][];
+  };
+  ClipBuild: {
+   experiment: string;
+   status: string;
+   progress: number;
+   message: string;
+  };
+  ClipBuilds: {
+   lacks: string;
+   builds: components["schemas"]["ClipBuild"][];
   };
   ClipDifference: {
    /** @enum {string} */
@@ -3094,7 +3114,6 @@ export interface components {
    toml: string;
    demonstration: boolean;
    clips_ready: boolean;
-   build: string;
   };
   ShownAnswer: {
    /** @enum {string} */
@@ -3903,6 +3922,8 @@ export type ChangeWorkspace = components['schemas']['ChangeWorkspace'];
 export type CheckAnswer = components['schemas']['CheckAnswer'];
 export type CheckWording = components['schemas']['CheckWording'];
 export type ChoiceField = components['schemas']['ChoiceField'];
+export type ClipBuild = components['schemas']['ClipBuild'];
+export type ClipBuilds = components['schemas']['ClipBuilds'];
 export type ClipDifference = components['schemas']['ClipDifference'];
 export type ClipInRole = components['schemas']['ClipInRole'];
 export type ClipOut = components['schemas']['ClipOut'];
@@ -6867,6 +6888,69 @@ export interface operations {
     };
     content: {
      "application/json": components["schemas"]["ClipOut"][];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ list_clip_builds: {
+  parameters: {
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ClipBuilds"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ begin_clip_build: {
+  parameters: {
+   path: {
+    experiment: string;
+   };
+  };
+  responses: {
+   202: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ClipBuild"];
     };
    };
    422: {

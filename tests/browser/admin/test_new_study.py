@@ -7,6 +7,8 @@ import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.admin.conftest import Dashboard
+from tests.browser.admin.test_own_videos import shoot
+from tests.browser.visit import axe_violations
 from tests.helpers.tiny_clips import encoded_video
 
 pytestmark = pytest.mark.browser
@@ -114,11 +116,46 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
     assert opened.ok
 
 
-def test_demonstrations_that_are_not_built_are_named_with_their_commands(dashboard: Dashboard) -> None:
-    page = dashboard.open("/")
-    page.get_by_role("link", name="New study").click()
+def test_a_demonstration_is_built_by_a_button_and_made_a_study(dashboard: Dashboard) -> None:
+    page = dashboard.open("/studies/new")
     page.get_by_role("tab", name="From a shipped experiment").click()
-    page.get_by_text("Demonstrations without clips on this server").click()
-    expect(page.get_by_role("listitem").filter(has_text="stimuli build pairs-demo --out ")).to_be_visible()
+    panel = page.get_by_role("tabpanel", name="From a shipped experiment")
+    expect(panel.get_by_role("heading", name="Demonstrations")).to_be_visible()
+    expect(panel.get_by_text("stimuli build")).to_have_count(0)
+    assert axe_violations(page) == []
+    shoot(dashboard, "new-demos")
+    panel.get_by_role("button", name="Build its clips: dcr-demo").press("Enter")
+    expect(panel.get_by_role("progressbar", name="Clips of dcr-demo built")).to_be_visible()
+    expect(panel.get_by_role("button", name="Build its clips: pairs-demo")).to_be_disabled()
+    page.goto(f"{dashboard.server.address}/admin/")  # the build goes on without the page
+    page.goto(f"{dashboard.server.address}/admin/studies/new")
+    page.get_by_role("tab", name="From a shipped experiment").click()
+    expect(panel.get_by_text(re.compile("[1-6] of 6 clips"))).to_be_visible(timeout=120_000)
+    panel.get_by_role("button", name="Create “dcr-demo”").click(timeout=180_000)
+    page.get_by_text("dcr-demo, version 1").wait_for()
     page.goto(f"{dashboard.server.address}/nothing")
     expect(page.get_by_role("heading", name="Page not found")).to_be_visible()
+
+
+def test_templates_are_cards_that_the_arrow_keys_reach(dashboard: Dashboard, clips: list[Path]) -> None:
+    page = dashboard.open("/studies/new")
+    cards = page.get_by_role("radiogroup", name="What participants do")
+    expect(cards.get_by_role("radio")).to_have_count(7)
+    rating = cards.get_by_role("radio", name="Rating on seven points")
+    expect(rating).to_be_checked()
+    shoot(dashboard, "new-start")
+    Hand(page).bring(clips)
+    question = page.get_by_label("Question", exact=True)
+    expect(question).to_have_value("How natural was this clip?")
+    rating.focus()
+    page.keyboard.press("ArrowRight")
+    expect(cards.get_by_role("radio", name="Rating on a slider")).to_be_checked()
+    cards.get_by_role("radio", name="Paired comparisons").click()
+    expect(question).to_have_value("Which clip looked more natural?")
+    expect(page.get_by_text("Two clips side by side.")).to_be_visible()
+    question.fill("Which is alive?")  # one's own question stays
+    cards.get_by_role("radio", name="Mean opinion score (ACR)").click()
+    expect(question).to_have_value("Which is alive?")
+    assert axe_violations(page) == []
+    shoot(dashboard, "new-templates")
+    page.get_by_role("button", name="Start over").click()

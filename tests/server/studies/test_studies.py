@@ -1,6 +1,7 @@
 import io
 import json
 import re
+import time
 import tomllib
 import zipfile
 from pathlib import Path
@@ -11,6 +12,7 @@ from fastapi.testclient import TestClient
 
 from experiments.load import parse_experiment
 from server.context import Services
+from server.results import demo_builds
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 from tests.helpers.tiny_clips import encoded_video, make_clip_folder
@@ -460,7 +462,7 @@ def test_an_edit_that_cannot_be_used_is_refused_with_its_line(
     assert "per_cell" in answer.json()["error"]["message"]
 
 
-def test_shipped_experiments_say_how_their_clips_are_built(viewer: Admin, services: Services) -> None:
+def test_shipped_experiments_say_whether_their_clips_are_built(viewer: Admin, services: Services) -> None:
     folder = services.settings.stimuli_folder
     (folder / "sliders-demo").mkdir(parents=True)
     (folder / "sliders-demo" / "manifest.json").write_text("{}")
@@ -468,8 +470,45 @@ def test_shipped_experiments_say_how_their_clips_are_built(viewer: Admin, servic
     assert shipped["sliders-demo"]["clips_ready"]
     demo = shipped["pairs-demo"]
     assert (demo["demonstration"], demo["clips_ready"]) == (True, False)
-    assert demo["build"] == f"stimuli build pairs-demo --out {folder / 'pairs-demo'}"
     assert not shipped["exp1"]["demonstration"]
+
+
+def test_a_build_that_fails_says_why_and_can_be_asked_for_again(
+    experimenter: Admin, viewer: Admin, services: Services
+) -> None:
+    services.settings.stimuli_folder.mkdir(parents=True, exist_ok=True)
+    (services.settings.stimuli_folder / "dcr-demo").write_text("a file where the folder of clips belongs")
+    assert viewer.get("/experiments/builds").json() == {"lacks": "", "builds": []}
+    assert viewer.send("POST", "/experiments/dcr-demo/builds", {}).status_code == 403
+    for _ in range(2):
+        begun = experimenter.send("POST", "/experiments/dcr-demo/builds", {})
+        assert (begun.status_code, begun.json()["status"]) == (202, "queued")
+        other = experimenter.send("POST", "/experiments/pairs-demo/builds", {})
+        assert other.status_code == 409
+        assert "'dcr-demo' are being built" in other.json()["error"]["message"]
+        [build] = _ended_builds(viewer)
+        assert (build["experiment"], build["status"]) == ("dcr-demo", "failed")
+        assert "dcr-demo" in build["message"]
+        assert "Traceback" not in build["message"]
+
+
+def _ended_builds(viewer: Admin) -> list[dict[str, str]]:
+    until = time.monotonic() + 60
+    while time.monotonic() < until:
+        builds: list[dict[str, str]] = viewer.get("/experiments/builds").json()["builds"]
+        if all(build["status"] not in {"queued", "running"} for build in builds):
+            return builds
+        time.sleep(0.2)
+    raise AssertionError("the build did not end within a minute")
+
+
+def test_a_server_that_cannot_render_says_so(experimenter: Admin, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(demo_builds, "RENDERS_WITH", "a_module_that_is_not_installed")
+    lacks = experimenter.get("/experiments/builds").json()["lacks"]
+    assert lacks.startswith("This server cannot render clips.")
+    refused = experimenter.send("POST", "/experiments/dcr-demo/builds", {})
+    assert (refused.status_code, refused.json()["error"]["message"]) == (409, lacks)
+    assert experimenter.send("POST", "/experiments/nothing/builds", {}).status_code == 404
 
 
 COMMENTS = """

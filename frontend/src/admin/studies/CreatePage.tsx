@@ -18,6 +18,7 @@ import {
   Textarea,
   Anchor,
   Card,
+  Progress,
   Group,
   SimpleGrid,
   Title,
@@ -28,6 +29,7 @@ import { UploadClips, StillNeeded } from "../clips/UploadClips";
 import { playNeeded, useUpload } from "../clips/useUpload";
 import { factorsOfTable, fieldsOf, levelsByPattern, patternProblem, reservedProblem, unnamedFactors, withNames } from "./file-pattern";
 import { Answer } from "../ui/Answer";
+import { TemplateCards, TEMPLATES, type TemplateWords } from "./templates";
 
 // TOML with its problems, checked while typing, and what it expands to.
 
@@ -151,71 +153,6 @@ function FromDefinition({ name, onTaken }: { name: string; onTaken: (message: st
   );
 }
 
-// What participants do with somebody's own clips: the templates to begin from.
-
-type Template = NonNullable<Schemas["OwnClips"]["template"]>;
-
-interface Words {
-  value: Template;
-  label: string;
-  about: string;
-  question: string;
-  /** Whether the two ends of a scale are asked for. */
-  ends: boolean;
-}
-
-const TEMPLATES: readonly [Words, ...Words[]] = [
-  {
-    value: "rating",
-    label: "Rating on seven points",
-    about: "One clip after the other, each rated from 1 to 7.",
-    question: "How natural was this clip?",
-    ends: true,
-  },
-  {
-    value: "slider",
-    label: "Rating on a slider",
-    about: "One clip after the other, each rated on a slider from 0 to 100.",
-    question: "How natural was this clip?",
-    ends: true,
-  },
-  {
-    value: "sliders",
-    label: "Several sliders",
-    about: "One clip after the other, with two sliders from 0 to 100 to begin with.",
-    question: "How natural was this clip?",
-    ends: true,
-  },
-  {
-    value: "acr",
-    label: "Mean opinion score (ACR)",
-    about: "Absolute category rating of ITU-T P.910: Bad, Poor, Fair, Good, Excellent.",
-    question: "How would you rate the quality of this clip?",
-    ends: false,
-  },
-  {
-    value: "dcr",
-    label: "Degradation (DCR)",
-    about: "ITU-T P.910: the reference, then the clip, from Very annoying to Imperceptible.",
-    question: "How impaired is the second clip, compared with the first?",
-    ends: false,
-  },
-  {
-    value: "pairs",
-    label: "Paired comparisons",
-    about: "Two clips side by side. Every clip is compared with every other of the same exemplar number.",
-    question: "Which clip looked more natural?",
-    ends: false,
-  },
-  {
-    value: "just_noticeable",
-    label: "Just-noticeable difference",
-    about: "Two clips in turn, the standard and a stimulus, in adaptive series. One factor has numeric levels; the lowest is the standard.",
-    question: "In which of the two clips was the effect stronger?",
-    ends: false,
-  },
-];
-
 // A study from somebody's own clips: upload, say which levels each has, ask a question.
 
 const MAX_ROWS = 100;
@@ -223,13 +160,16 @@ const MAX_ROWS = 100;
 function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
   const upload = useUpload("new study");
   const { last, received } = upload;
+  const [template, setTemplate] = useState(TEMPLATES[0]);
   return (
     <Stack>
       <UploadClips upload={upload} />
+      <TemplateCards chosen={template} onChoose={setTemplate} />
       {last !== null && (
         <Levels
           key={last.id}
           name={name}
+          template={template}
           upload={last}
           isLooked={received !== null}
           notPlayed={playNeeded(upload)}
@@ -245,6 +185,7 @@ const inWords = (levels: string[]) => `${levels.slice(0, 4).join(", ")}${levels.
 
 interface LevelsProps {
   name: string;
+  template: TemplateWords;
   upload: Schemas["UploadOut"];
   /** Whether every file has been looked into. */
   isLooked: boolean;
@@ -254,14 +195,15 @@ interface LevelsProps {
   onCreated: () => void;
 }
 
-function Levels({ name, upload, isLooked, notPlayed, onTaken, onCreated }: LevelsProps) {
+function Levels({ name, template, upload, isLooked, notPlayed, onTaken, onCreated }: LevelsProps) {
   const [by, setBy] = useState("pattern");
   // As the files suggest it, also after one was left out or came, until it is written.
   const [written, setWritten] = useState<{ pattern?: string; csv?: string }>({});
   const pattern = written.pattern ?? upload.suggested_pattern ?? "";
   const csv = written.csv ?? `file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`;
-  const [template, setTemplate] = useState(TEMPLATES[0]);
-  const [asked, setAsked] = useState({ title: "", question: template.question, low: "very unnatural", high: "very natural" });
+  // Until a question is written, it is the template's.
+  const [typed, setAsked] = useState({ title: "", question: null as string | null, low: "very unnatural", high: "very natural" });
+  const asked = { ...typed, question: typed.question ?? template.question };
   const [names, setNames] = useState<Record<string, string>>({});
   const files = upload.files.map((file) => file.name);
   const create = useCreate(onTaken, onCreated, true);
@@ -274,7 +216,7 @@ function Levels({ name, upload, isLooked, notPlayed, onTaken, onCreated }: Level
     asked.title.trim() === "" && "a title of the study",
   ];
   const field = (key: keyof typeof asked, label: string) => (
-    <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...asked, [key]: event.currentTarget.value })} />
+    <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...typed, [key]: event.currentTarget.value })} />
   );
   return (
     <Stack>
@@ -320,19 +262,6 @@ function Levels({ name, upload, isLooked, notPlayed, onTaken, onCreated }: Level
           onChange={(event) => setWritten({ ...written, csv: event.currentTarget.value })}
         />
       )}
-      <Select
-        label="What participants do"
-        description={template.about}
-        data={TEMPLATES.map(({ value, label }) => ({ value, label }))}
-        value={template.value}
-        allowDeselect={false}
-        onChange={(value) => {
-          const chosen = TEMPLATES.find((one) => one.value === value) ?? template;
-          // A question of the experimenter's own stays.
-          if (asked.question === template.question) setAsked({ ...asked, question: chosen.question });
-          setTemplate(chosen);
-        }}
-      />
       {field("title", "Title of the study")}
       {field("question", "Question")}
       {template.ends && field("low", "Lowest answer means")}
@@ -402,54 +331,74 @@ function LevelsTable({ pattern, files }: { pattern: string; files: string[] }) {
   );
 }
 
+const buildsQuery = { queryKey: ["clip builds"], queryFn: () => unwrap(api.GET("/api/admin/experiments/builds")) };
+type Build = Schemas["ClipBuild"];
+
+const isUnderWay = (build: Build | undefined) => build?.status === "queued" || build?.status === "running";
+
 function FromShipped({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
-  const shipped = useQuery({ queryKey: ["experiments"], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
+  const builds = useQuery({
+    ...buildsQuery,
+    refetchInterval: ({ state }) => (state.data?.builds.some(isUnderWay) === true ? 1_000 : false),
+  }).data;
+  const busy = builds?.builds.some(isUnderWay) ?? false;
+  // Which experiments have clips is asked again when a build ends.
+  const shipped = useQuery({ queryKey: ["experiments", busy], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
   const create = useCreate(onTaken);
   const present = new Set(useQuery(studiesQuery).data?.map((study) => study.name));
+  const card = (experiment: Shipped) => (
+    <Card withBorder key={experiment.name}>
+      <Title order={3} size="h5">
+        {experiment.title}
+      </Title>
+      <Text size="sm" c="dimmed" mb="md">
+        {experiment.name}
+      </Text>
+      {name === "" && present.has(experiment.name) ? (
+        <Text size="sm" mt="auto">
+          It is{" "}
+          <Anchor component={Link} to={`/studies/${experiment.name}`} underline="always">
+            there already
+          </Anchor>
+          . To create another one, enter a short name above.
+        </Text>
+      ) : experiment.clips_ready ? (
+        <Group mt="auto">
+          <Button
+            loading={create.isPending && create.variables.shipped === experiment.name}
+            onClick={() => create.mutate({ name: name || experiment.name, shipped: experiment.name })}
+          >
+            Create “{name || experiment.name}”
+          </Button>
+        </Group>
+      ) : (
+        <BuildClips
+          experiment={experiment.name}
+          lacks={builds?.lacks ?? ""}
+          busy={busy}
+          build={builds?.builds.find((one) => one.experiment === experiment.name)}
+        />
+      )}
+    </Card>
+  );
   return (
     <Answer of={shipped}>
       {(experiments) => (
         <Stack>
-          <Text size="sm">
-            The three experiments of the paper, and demonstrations whose clips are on this server. You can change texts and settings later.
-          </Text>
-          <SimpleGrid cols={{ base: 1, sm: 3 }}>
-            {experiments
-              .filter((one) => !isUnbuiltDemo(one))
-              .map((experiment) => (
-                <Card withBorder key={experiment.name}>
-                  <Title order={2} size="h4">
-                    {experiment.title}
-                  </Title>
-                  <Text size="sm" c="dimmed" mb="md">
-                    {experiment.name}
-                  </Text>
-                  {name === "" && present.has(experiment.name) ? (
-                    <Text size="sm" mt="auto">
-                      It is{" "}
-                      <Anchor component={Link} to={`/studies/${experiment.name}`} underline="always">
-                        there already
-                      </Anchor>
-                      . To create another one, enter a short name above.
-                    </Text>
-                  ) : experiment.clips_ready ? (
-                    <Group mt="auto">
-                      <Button
-                        loading={create.isPending && create.variables.shipped === experiment.name}
-                        onClick={() => create.mutate({ name: name || experiment.name, shipped: experiment.name })}
-                      >
-                        Create “{name || experiment.name}”
-                      </Button>
-                    </Group>
-                  ) : (
-                    <Alert color="yellow" className="wrap-anywhere">
-                      Its clips are not on this server. Run <code>{experiment.build}</code> there, or upload them.
-                    </Alert>
-                  )}
-                </Card>
-              ))}
-          </SimpleGrid>
-          <Unbuilt demos={experiments.filter((one) => isUnbuiltDemo(one) && !present.has(one.name))} />
+          <Text size="sm">You can change texts and settings later. Clips are built on the server; you can leave this page meanwhile.</Text>
+          {[
+            { title: "Experiments of the paper", isDemo: false },
+            { title: "Demonstrations", isDemo: true },
+          ].map(({ title, isDemo }) => (
+            <Stack key={title} gap="xs">
+              <Title order={2} size="h4">
+                {title}
+              </Title>
+              <SimpleGrid cols={{ base: 1, sm: 3 }}>
+                {experiments.filter(({ demonstration }) => demonstration === isDemo).map((one) => card(one))}
+              </SimpleGrid>
+            </Stack>
+          ))}
         </Stack>
       )}
     </Answer>
@@ -458,23 +407,47 @@ function FromShipped({ name, onTaken }: { name: string; onTaken: (message: strin
 
 type Shipped = Schemas["ShippedExperiment"];
 
-function isUnbuiltDemo({ demonstration, clips_ready }: Shipped): boolean {
-  return demonstration && !clips_ready;
+interface BuildProps {
+  experiment: string;
+  /** Why this server cannot build; empty where it can. */
+  lacks: string;
+  /** Whether the clips of any experiment are being built. */
+  busy: boolean;
+  build: Build | undefined;
 }
 
-function Unbuilt({ demos }: { demos: Shipped[] }) {
-  if (demos.length === 0) return null;
+/** A button that has the server build the clips, how far it is, and why it failed. */
+function BuildClips({ experiment, lacks, busy, build }: BuildProps) {
+  const begin = useChange(() => unwrap(api.POST("/api/admin/experiments/{experiment}/builds", { params: { path: { experiment } } })), {
+    touches: [buildsQuery.queryKey],
+  });
+  if (build !== undefined && isUnderWay(build))
+    return (
+      <Stack gap={4} mt="auto" role="status">
+        <Text size="sm" className="number">
+          Building its clips: {build.message}
+        </Text>
+        <Progress value={100 * build.progress} animated aria-label={`Clips of ${experiment} built`} />
+      </Stack>
+    );
   return (
-    <Text size="sm" component="details">
-      <summary>Demonstrations without clips on this server ({demos.length})</summary>
-      <ul>
-        {demos.map(({ name, title, build }) => (
-          <li key={name}>
-            {title}: <code>{build}</code>
-          </li>
-        ))}
-      </ul>
-    </Text>
+    <Stack gap={4} mt="auto" align="start">
+      {build?.status === "failed" && (
+        <Text size="sm" c="var(--mantine-color-error)" className="wrap-anywhere">
+          The clips were not built: {build.message}
+        </Text>
+      )}
+      <Button
+        variant="default"
+        disabled={lacks !== "" || busy}
+        loading={begin.isPending}
+        onClick={() => begin.mutate(undefined)}
+        aria-label={`Build its clips: ${experiment}`}
+      >
+        Build its clips
+      </Button>
+      {lacks !== "" && <Text size="sm">{lacks}</Text>}
+    </Stack>
   );
 }
 
