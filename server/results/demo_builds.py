@@ -9,7 +9,6 @@ from pathlib import Path
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
@@ -25,6 +24,7 @@ from server.core.locks import Locks
 from server.core.settings import Settings
 from server.core.values import new_public_id, now
 from server.models import Job
+from server.results import repository
 from server.results.jobs import in_background, is_under_way, job_state, last_line, note
 
 KIND = "demo clips"
@@ -101,8 +101,7 @@ def _stimuli_program() -> Path:
 
 def _latest_jobs(session: Session) -> dict[str, Job]:
     """The latest build of each experiment."""
-    query = select(Job).where(Job.study_id.is_(None), Job.kind == KIND).order_by(Job.id)
-    return {job.parameters["experiment"]: job for job in session.scalars(query)}
+    return {job.parameters["experiment"]: job for job in repository.jobs_without_study(session, KIND)}
 
 
 def _build_out(locks: Locks, experiment: str, job: Job) -> ClipBuild:

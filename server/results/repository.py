@@ -235,6 +235,12 @@ def jobs_of(session: Session, study: Study, kind: JobKind) -> list[Job]:
     return list(session.scalars(query.order_by(Job.id.desc())))
 
 
+def jobs_without_study(session: Session, kind: str) -> list[Job]:
+    """Every job of a kind that belongs to no study, oldest first."""
+    query = select(Job).where(Job.study_id.is_(None), Job.kind == kind)
+    return list(session.scalars(query.order_by(Job.id)))
+
+
 def find_job(session: Session, study: Study, kind: JobKind, public_id: str) -> Job | None:
     """The job of a kind for a study with this public id."""
     of_study = (Job.study_id == study.id, Job.kind == kind, Job.public_id == public_id)

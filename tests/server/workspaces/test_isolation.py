@@ -33,6 +33,7 @@ OUTSIDERS = ("owner elsewhere", "experimenter elsewhere", "viewer elsewhere", "n
 OWN: set[str] = {
     f"{ADMIN}/invitations/{{token}}",
     f"{ADMIN}/blinks/strips/{{name}}",
+    f"{ADMIN}/experiments/{{experiment}}/builds",
     f"{ADMIN}/session/providers/{{provider}}",
 }
 """Beginnings of paths whose parameter is the caller's secret, or a file that is everybody's."""

@@ -14,8 +14,12 @@ from experiments.errors import InputError
 from stimuli_builder.blinks.export import AnimationCurve, CurveTarget, write_curve
 from stimuli_builder.cli import app
 from stimuli_builder.clips.design_clips import performance_curve
-from stimuli_builder.performance.audio import speech_in_audio
-from stimuli_builder.performance.run import PerformanceJob, speech_in_subtitles, write_performance
+from stimuli_builder.performance.run import (
+    PerformanceJob,
+    speech_in_audio,
+    speech_in_subtitles,
+    write_performance,
+)
 
 RATE_HZ = 16_000
 SUBTITLES = """WEBVTT
