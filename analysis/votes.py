@@ -114,7 +114,10 @@ def standardized_votes(values: Array, group: Codes) -> Array:
     n = np.bincount(group)
     mean = np.bincount(group, values) / n
     spread = np.bincount(group, (values - mean[group]) ** 2) / np.maximum(n - 1, 1)
-    sd = np.where(spread > 0, np.sqrt(spread), np.nan)
+    # The same decimal throughout leaves a spread of rounding alone: its scores would be noise of size 1.
+    largest = np.zeros(n.size)
+    np.maximum.at(largest, group, np.abs(values))
+    sd = np.where(np.sqrt(spread) > 1e-12 * largest, np.sqrt(spread), np.nan)
     return np.asarray((values - mean[group]) / sd[group], dtype=np.float64)
 
 

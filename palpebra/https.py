@@ -24,6 +24,7 @@ from palpebra.start import Port, first_page, serve_folder
 
 NAME = re.compile(r"(?!-)[a-z0-9-]{1,63}(?<!-)(\.(?!-)[a-z0-9-]{1,63}(?<!-))*", re.IGNORECASE)
 OBTAINED = "certificate obtained successfully"
+SECONDS_AFTER_CTRL_C = 15.0
 SECONDS_TO_FAIL = 2.0
 """A Caddy that cannot listen ends well within this time."""
 HERE = Path(__file__).resolve().parent
@@ -223,10 +224,10 @@ def _watch(
             typer.echo("Caddy got the certificate.")
             process.wait()
         elif (error := last_error(log)) and error != printed:
-            typer.echo(f"No certificate yet: {error} (log: {log})")
+            typer.echo(f"Caddy reports: {error} (log: {log})")
             printed = error
-    # 0: by Ctrl-C, which Caddy got too. Below 0: by a signal, as where memory ran out.
-    if process.returncode != 0 and not stopping.is_set():
+    # Ctrl-C ends Caddy too, a moment before the server has stopped.
+    if not stopping.wait(0 if process.returncode else SECONDS_AFTER_CTRL_C):
         lost.set()
         _thread.interrupt_main()
 

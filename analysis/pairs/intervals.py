@@ -36,6 +36,9 @@ TRIES = 4
 RATERS_TIGHTEST, COMPARISONS_TIGHTEST = 40, 1000
 """Where anytime-valid intervals are narrowest, of raters or of single comparisons. Fixed before the data."""
 RATERS_MIN = 10
+STEP_MAX = 5.0
+FAR = 50.0
+"""An ability, in logits, at which every comparison is certain."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +149,12 @@ def _profile(pairs: FittedPairs, row: Array) -> tuple[float, float]:
 
         def reached(log_mu: float, sign: float = sign) -> float:
             nonlocal at
-            at = _climb(pairs, sign * np.exp(-log_mu) * row, at)
-            return float(step(pairs.model, pairs.counts, at, False)[0] - best + height)
+            start = at if np.abs(at).max() < FAR else pairs.fitted.parameters
+            # Far out a share is 0 and its logarithm minus infinity: lower than any height, as it should be.
+            with np.errstate(divide="ignore", invalid="ignore"):
+                at = _climb(pairs, sign * np.exp(-log_mu) * row, start)
+                value = float(step(pairs.model, pairs.counts, at, False)[0])
+            return value - best + height if np.isfinite(value) else -1e9
 
         # The multiplier that a quadratic likelihood has at that height.
         middle = 0.5 * np.log(spread / (2 * height))
@@ -169,14 +176,22 @@ def _climb(pairs: FittedPairs, slope: Array, start: Array) -> Array:
         at = pairs.fitted.parameters
         value, gradient, information, *_ = step(pairs.model, pairs.counts, at, False)
     for _ in range(100):
+        # A slope steeper than the likelihood falls anywhere has no maximum: the point runs away, and its
+        # likelihood, far below the height, says so.
+        if np.abs(at).max() > FAR or np.linalg.cond(information) > 1e14:
+            break
         change, size = np.linalg.solve(information, gradient + slope), 1.0
         if np.max(np.abs(change)) < 1e-10:
             break
+        # Where the likelihood is nearly flat, a whole Newton step would leave the range of numbers.
+        change *= min(1.0, STEP_MAX / float(np.abs(change).max()))
         while size > 1e-8:
             value_there, *there = step(pairs.model, pairs.counts, at + size * change, False)
             if value_there + slope @ (at + size * change) >= value + slope @ at - 1e-12 * (1 + abs(value)):
                 break
             size /= 2
+        else:
+            break
         at, value, (gradient, information, *_) = at + size * change, value_there, there
     return at
 
@@ -196,6 +211,8 @@ def resampled_parameters(pairs: FittedPairs, samples: int) -> tuple[Array, int]:
     raters = pairs.comparisons.participant is not None
     of_raters = count_by_rater(pairs.comparisons, pairs.counts) if raters else None
     number = of_raters.shape[0] if of_raters is not None else pairs.comparisons.outcome.size
+    if raters and number < 2:
+        raise InputError("--intervals bootstrap needs two raters or more, got 1; omit --participant")
     draws: list[Array] = []
     for tried in range(TRIES * samples):
         if len(draws) == samples:
@@ -272,6 +289,8 @@ def compare_questions(
                 f"question '{name}' has other items than '{names[0]}'; expected the same items for each"
             )
     people = sorted({person for own in questions.values() for person in own.participants})
+    if len(people) == 1:
+        raise InputError("--question needs two raters or more, got 1; omit --participant")
     design = free_abilities(len(items))
     centring = design - design.mean(axis=0)
     abilities, parts, covariances = {}, {}, {}

@@ -232,6 +232,7 @@ def sample_size_text(result: PowerResult, design: Design, target: float, version
     return (
         f"Sample size was planned by simulation with Palpebra {version}. {design.population}. For each "
         f"number of participants, {result.simulations} data sets were simulated (seed {result.seed}) and "
-        f"analyzed as planned for the study ({design.test}), with alpha = {result.alpha:g}. The smallest "
-        f"numbers of participants with a power of {target:g} were: {'; '.join(said)}."
+        f"analyzed with {design.test}, with alpha = {result.alpha:g}. Of the "
+        f"numbers tried ({', '.join(map(str, result.n))}), the smallest with a power of {target:g} were: "
+        f"{'; '.join(said)}."
     )

@@ -35,6 +35,9 @@ def power_of_means(experiment: Experiment) -> PlanCommand:
         arguments += [option, ",".join(named)] if named else []
     for factor in factors:
         arguments += ["--effect", f"{factor.name}={MEDIUM_F}"]
+    # The same test that the report leads with.
+    univariate = experiment.analysis.statistic == "univariate"
+    arguments += ["--statistic", "greenhouse-geisser" if univariate else "multivariate"]
     alone = all(factor.between for factor in factors)
     means = "each participant gives one mean" if alone else "two means of a participant correlate by 0.5"
     return PlanCommand(

@@ -27,6 +27,9 @@ QUIET = (
     "boto3",
     "s3transfer",
     "urllib3",
+    # They name the address of every request, and a webhook's address is a secret.
+    "httpx2",
+    "httpcore2",
 )
 
 NEEDLESS = (

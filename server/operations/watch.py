@@ -240,7 +240,7 @@ def _call_webhook(address: str, content: dict[str, str]) -> bool:
                 return True
             LOG.error("the webhook refused a warning: expected status 2xx, got %d", answer.status_code)
     except httpx2.TimeoutException:
-        LOG.error("the webhook did not answer within %g s; the warning is sent again later", WEBHOOK_S)
-    except (httpx2.HTTPError, OSError) as error:
+        LOG.error("the webhook did not answer within %g s; check PALPEBRA_WEBHOOK_URL", WEBHOOK_S)
+    except (httpx2.HTTPError, httpx2.InvalidURL, ValueError, OSError) as error:
         LOG.error("the webhook cannot be reached (%s); check PALPEBRA_WEBHOOK_URL", type(error).__name__)
     return False

@@ -167,7 +167,7 @@ class StoredClips:
         """What is known by now, at once; clips that were never examined are examined in the background."""
         if any(_key(clip) not in self._known for clip in clips):
             self._begin(list(clips))
-        faults = [fault for clip in clips for fault in self._known.get(_key(clip), ())]
+        faults = [fault for clip in clips for fault in self._faults_of(clip)]
         if isinstance(self._store, FolderStore):  # asking an object store for each would take seconds
             missing = {clip.file for clip in clips if self._store.size(clip.sha256) is None}
             faults = [fault for fault in faults if fault.file not in missing]
@@ -192,7 +192,11 @@ class StoredClips:
         ends = time.monotonic() + within_s
         with self._turn:
             left = self._examine(clips, ends)
-        return [fault for clip in clips for fault in self._known.get(_key(clip), ())], left
+        return [fault for clip in clips for fault in self._faults_of(clip)], left
+
+    def _faults_of(self, clip: Clip | CheckClip) -> list[ClipFault]:
+        """What is known of a clip, under its own name: another study may call the same bytes otherwise."""
+        return [fault._replace(file=clip.file) for fault in self._known.get(_key(clip), ())]
 
     def _begin(self, clips: list[Clip | CheckClip]) -> None:
         if self._background is None or not self._background.is_alive():

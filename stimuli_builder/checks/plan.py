@@ -88,7 +88,7 @@ def _settings(experiment: Experiment, seed: int, number: int, base: Path | None)
     drawn = generator("check", seed, number, "cell").integers(len(clips))
     settings = design.render_settings(experiment, clips[int(drawn)])
     if settings.character == UNDECLARED and not _is_there(UNDECLARED, base):
-        # A study of one's own clips declares no character, and the default is no longer shipped.
+        # A study of own clips declares no character, and the default is no longer shipped.
         return settings.model_copy(update={"character": "cartoon"})
     return settings
 

@@ -172,7 +172,7 @@ def write_strips(folder: Path, characters: Sequence[str] = ()) -> list[tuple[str
 
 
 def spatial_temporal_information(path: Path) -> tuple[float, float]:
-    r"""SI and TI of a video, in code values of its luminance (8 bits).
+    r"""SI and TI of a video, in values of its luminance from 0 (black) to 255 (white), whatever its format.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def spatial_temporal_information(path: Path) -> tuple[float, float]:
     """
     si = ti = 0.0
     before = None
-    for _, picture in decode(path):
+    for _, picture in decode(path, lambda frame: frame.to_ndarray(format="gray")):
         luminance = picture.astype(np.float64)
         across = cv2.Sobel(luminance, cv2.CV_64F, 1, 0)[1:-1, 1:-1]
         down = cv2.Sobel(luminance, cv2.CV_64F, 0, 1)[1:-1, 1:-1]

@@ -2,6 +2,7 @@
 
 import shlex
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import cast, get_args
 
@@ -244,8 +245,13 @@ def _onsets(path: Path, duration_s: float) -> list[float]:
         onsets = sorted(float(text) for text in texts)
     except ValueError as error:
         raise InputError(f"{path}: {name}: expected seconds: {error}") from error
-    if not onsets or not 0 <= onsets[0] <= onsets[-1] <= duration_s:
+    if not onsets or not all(0 <= one <= duration_s for one in onsets):  # NaN is in no range
         raise InputError(f"{path}: expected times from 0 to {duration_s:g} s; fix them or --duration")
+    least = default_parameters().least_interval_s
+    for earlier, later in pairwise(onsets):
+        if later - earlier < least:
+            said = f"expected {least:g} s between blinks, got {earlier:g} and {later:g} s"
+            raise InputError(f"{path}: {said}")
     return onsets
 
 

@@ -89,3 +89,18 @@ def test_a_request_is_logged_by_its_route(
     for record in caplog.records:
         assert "secret" not in JsonLines().format(record)
         assert record.__dict__["fields"]["route"] == "/api/links/{link_token}"
+
+
+def test_no_address_that_the_server_calls_is_logged(capfd: pytest.CaptureFixture[str]) -> None:
+    """A webhook's address is its secret; the client would log it with every request."""
+    kept = {name: logging.getLogger(name).level for name in ("", "httpx2", "httpcore2")}
+    handlers = logging.getLogger().handlers[:]
+    try:
+        logging.config.dictConfig(logging_configuration(Settings()))
+        for name in ("httpx2", "httpcore2.connection"):
+            logging.getLogger(name).info("HTTP Request: POST https://hooks.example.org/%s", SECRET)
+    finally:
+        logging.getLogger().handlers[:] = handlers
+        for name, level in kept.items():
+            logging.getLogger(name).setLevel(level)
+    assert SECRET not in capfd.readouterr().err

@@ -29,6 +29,11 @@ const letter = createRoute({
 const inside = createRoute({ getParentRoute: () => root, id: "inside", component: Shell });
 const page = { getParentRoute: () => inside };
 const studies = createRoute({ ...page, path: "/", component: lazyRouteComponent(() => import("./studies/StudiesPage"), "StudiesPage") });
+const list = createRoute({
+  ...page,
+  path: "/studies",
+  component: lazyRouteComponent(() => import("./studies/StudiesPage"), "StudiesPage"),
+});
 const create = createRoute({
   ...page,
   path: "/studies/new",
@@ -113,6 +118,7 @@ const tree = root.addChildren([
   letter,
   inside.addChildren([
     studies,
+    list,
     create,
     account,
     people,

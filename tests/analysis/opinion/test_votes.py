@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from analysis.opinion import OpinionResult, fit_opinion
-from analysis.votes import Screening, Standard, read_votes, screen_raters
+from analysis.votes import Screening, Standard, read_votes, screen_raters, standardized_votes
 from experiments.errors import InputError
 
 P913: Screening = {"rule": "p913", "below": 0.75}
@@ -199,3 +199,11 @@ def test_repeats_of_differential_scores_are_refused(tmp_path: Path) -> None:
     votes = read_votes(hidden(tmp_path), "clip", "id", "score", (), standard)
     with pytest.raises(InputError, match="--repeats votes is not for --method acr-hr"):
         fit_opinion(votes, "votes", standard)
+
+
+@pytest.mark.parametrize("vote", [0.1, 3.3, 4.0])
+def test_a_person_who_never_varies_has_no_z_scores(vote: float) -> None:
+    values = np.array([vote] * 6 + [1.0, 2.0, 3.0])
+    scores = standardized_votes(values, np.array([0] * 6 + [1] * 3))
+    assert np.isnan(scores[:6]).all()
+    assert scores[6:] == pytest.approx([-1, 0, 1])

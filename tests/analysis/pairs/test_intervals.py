@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from analysis.cli import app
 from analysis.pairs.abilities import ItemFactors, fit_abilities
-from analysis.pairs.comparisons import LEFT, RIGHT, TIE, Comparisons
+from analysis.pairs.comparisons import LEFT, RIGHT, TIE, Comparisons, read_comparisons
 from analysis.pairs.crossed import CrossedLikelihood, crossed_pairs
 from analysis.pairs.intervals import compare_questions, rank_limits
 from analysis.pairs.likelihood import Model, free_abilities
@@ -388,3 +388,32 @@ def test_an_item_that_only_firths_penalty_keeps_finite_is_named() -> None:
     own = Comparisons(("a", "b", "c"), left, right, outcome, None, (), "made", True, ())
     said = fit_abilities(own, firth=True).decisions
     assert said == ("a won every comparison with the others: only Firth's penalty keeps the ability finite",)
+
+
+@pytest.mark.parametrize(("won", "lost"), [(6, 2), (12, 4), (1, 1), (2, 1)])
+def test_profile_of_two_items_is_that_of_a_binomial(tmp_path: Path, won: int, lost: int) -> None:
+    """Few comparisons: the search starts where the likelihood is flat."""
+    table = tmp_path / "few.csv"
+    rows = ["a,b,a"] * won + ["a,b,b"] * lost
+    table.write_text("\n".join(["left,right,winner", *rows, ""]), encoding="utf-8")
+    comparisons = read_comparisons(table, "left", "right", "winner")
+    result = fit_abilities(comparisons, "bradley-terry", intervals="profile")
+    [contrast] = result.contrasts
+
+    def log_likelihood(logit: float) -> float:
+        return float(won * special.log_expit(logit) + lost * special.log_expit(-logit))
+
+    middle = float(np.log(won / lost))
+    height = log_likelihood(middle) - stats.chi2.ppf(0.95, 1) / 2
+    sides = ((middle - 20, middle), (middle, middle + 20))
+    ends = [optimize.brentq(lambda one: log_likelihood(one) - height, *side) for side in sides]
+    assert sorted((contrast.ci_low, contrast.ci_high)) == pytest.approx(ends, abs=1e-5)
+
+
+def test_one_rater_is_too_few_to_resample(tmp_path: Path) -> None:
+    table = tmp_path / "one.csv"
+    rows = ["a,b,a,p", "a,b,b,p", "a,b,a,p"]
+    table.write_text("\n".join(["left,right,winner,person", *rows, ""]), encoding="utf-8")
+    comparisons = read_comparisons(table, "left", "right", "winner", participant="person")
+    with pytest.raises(InputError, match="needs two raters or more, got 1"):
+        fit_abilities(comparisons, "bradley-terry", intervals="bootstrap")

@@ -82,7 +82,7 @@ def test_a_rehearsal_shows_everything_and_leaves_the_data_alone(
 @pytest.mark.parametrize(
     ("name", "command"),
     [
-        ("exp3", "plan anova --within lower_lid:4 --effect lower_lid=0.25"),
+        ("exp3", "plan anova --within lower_lid:4 --effect lower_lid=0.25 --statistic multivariate"),
         ("pairs-demo", "plan pairs --abilities 0.0,0.3,0.6,0.9 --repeats 2"),
     ],
 )

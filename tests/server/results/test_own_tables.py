@@ -145,3 +145,25 @@ def test_a_long_analysis_ends_and_another_may_begin(viewer: Admin, monkeypatch: 
 def test_who_is_not_signed_in_analyzes_nothing(viewer: Admin) -> None:
     viewer.client.cookies.clear()
     assert viewer.send("POST", "/analyses/columns", _body(_csv())).status_code == 401
+
+
+def test_a_table_may_have_many_columns_and_any_name(viewer: Admin) -> None:
+    lines = _csv().decode().splitlines()
+    more = [f"c{k}" for k in range(150)]
+    wide = "\n".join(
+        [",".join([lines[0], *more]), *(",".join([one, *["7"] * 150]) for one in lines[1:])]
+    ).encode()
+    roles = {**ROLES, **dict.fromkeys(more, "")}
+    done = viewer.send("POST", "/analyses", _body(wide, command="anova", roles=roles))
+    assert done.status_code == 200, done.text
+    rows = [dict(zip(("id", "face", "score", "note"), row, strict=True)) for row in _rows()]
+    body = _body(json.dumps(rows).encode(), "roles.json", command="anova", roles=ROLES)
+    done = viewer.send("POST", "/analyses", body)
+    assert done.status_code == 200, done.text
+
+
+def test_the_second_of_two_tables_at_once_is_refused_soon(viewer: Admin) -> None:
+    with own_tables._one_at_a_time:
+        done = viewer.send("POST", "/analyses/columns", _body(_csv()))
+    assert done.status_code == 503
+    assert done.headers["retry-after"] == "30"

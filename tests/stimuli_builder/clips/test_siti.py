@@ -67,3 +67,20 @@ def test_no_video_is_one_line(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["siti", str(tmp_path)])
     assert isinstance(done.exception, InputError)
     assert "expected videos, found none in" in str(done.exception)
+
+
+def test_values_do_not_depend_on_the_bits_of_the_file(tmp_path: Path) -> None:
+    pictures = [edge(34, 50), edge(34, 200)]
+    values = []
+    for pixels in ("yuv420p", "yuv420p10le"):
+        path = tmp_path / f"{pixels}.mkv"
+        with av.open(str(path), "w") as container:
+            stream = container.add_stream("ffv1", rate=25)
+            stream.height, stream.width = pictures[0].shape
+            stream.pix_fmt = pixels
+            for picture in pictures:
+                frame = av.VideoFrame.from_ndarray(picture, format="gray").reformat(format=pixels)
+                container.mux(stream.encode(frame))
+            container.mux(stream.encode())
+        values.append(spatial_temporal_information(path))
+    assert values[0] == pytest.approx(values[1], rel=0.02)

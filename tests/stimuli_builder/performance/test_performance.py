@@ -273,6 +273,8 @@ def test_eye_ratios_are_read_by_numpy(tmp_path: Path, name: str, opened: float) 
         ("seconds\n1\n", [], "expected a column time_s or onset_s, got seconds"),
         ("time_s\nsoon\n", [], "time_s: expected seconds"),
         ("time_s\n99\n", [], "expected times from 0 to 10 s"),
+        ("time_s\n1\nnan\n3\n", [], "expected times from 0 to 10 s"),
+        ("time_s\n1\n3\n3.05\n", [], "s between blinks, got 3 and 3.05 s"),
         ("time_s\n1\n", ["--rate", "20"], "remove --rate and --lively"),
         ("time_s\n1\n", ["--complete", "2"], "expected --complete from 0 to 1, got 2"),
     ],

@@ -35,7 +35,7 @@ export function StartPage() {
         {demo !== null && (
           <Choice
             title="Try the demo study"
-            text="Take part yourself: watch a few blinks and rate how natural they look. It takes two minutes."
+            text="Take part yourself: watch blinks and rate how natural they look. Stop whenever you like."
             button="Take part"
             href={demo}
             newTab

@@ -72,9 +72,17 @@ export function AnalyzePage() {
     },
     onSuccess: ({ columns }) => {
       setCommand(columns.command === "" ? "anova" : columns.command);
-      setRoles(Object.fromEntries(columns.columns.map(({ name, role }) => [name, role])));
+      setRoles(Object.fromEntries(columns.columns.flatMap(({ name, role }) => (role === "" ? [] : [[name, role]]))));
     },
   });
+  // A result belongs to the roles that it was computed with.
+  const changing =
+    <T,>(change: (to: T) => void) =>
+    (to: T) => {
+      analysis.reset();
+      change(to);
+    };
+  const missing = (table.data?.columns.commands[command]?.needed ?? []).filter((role) => !Object.values(roles).includes(role));
   return (
     <Stack maw={1100}>
       <Title order={1}>Analyze a table</Title>
@@ -108,9 +116,15 @@ export function AnalyzePage() {
       {table.error !== null && <ErrorAlert error={table.error} />}
       {table.data !== undefined && (
         <>
-          <ColumnRoles columns={table.data.columns} command={command} setCommand={setCommand} roles={roles} setRoles={setRoles} />
+          <ColumnRoles
+            columns={table.data.columns}
+            command={command}
+            setCommand={changing(setCommand)}
+            roles={roles}
+            setRoles={changing(setRoles)}
+          />
           <Group>
-            <Button loading={analysis.isPending} onClick={() => analysis.mutate(table.data)}>
+            <Button loading={analysis.isPending} disabled={missing.length > 0} onClick={() => analysis.mutate(table.data)}>
               Analyze
             </Button>
             {analysis.isPending && <Text role="status">This takes seconds, a mixed model up to a minute.</Text>}

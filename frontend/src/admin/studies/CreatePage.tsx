@@ -342,8 +342,9 @@ function FromShipped({ name, onTaken }: { name: string; onTaken: (message: strin
     refetchInterval: ({ state }) => (state.data?.builds.some(isUnderWay) === true ? 1_000 : false),
   }).data;
   const busy = builds?.builds.some(isUnderWay) ?? false;
-  // Which experiments have clips is asked again when a build ends.
-  const shipped = useQuery({ queryKey: ["experiments", busy], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
+  // Which experiments have clips is asked again when a build has ended.
+  const done = builds?.builds.filter(({ status }) => status === "done").length ?? 0;
+  const shipped = useQuery({ queryKey: ["experiments", done], queryFn: () => unwrap(api.GET("/api/admin/experiments")) });
   const create = useCreate(onTaken);
   const present = new Set(useQuery(studiesQuery).data?.map((study) => study.name));
   const card = (experiment: Shipped) => (
