@@ -31,8 +31,8 @@ from server.privacy import endpoints as privacy
 from server.privacy.retention import hourly_retention
 from server.rehearsals import endpoints as rehearsals
 from server.request_limits import ConcurrencyLimit, RequestLimits
-from server.results import demo_builds, own_tables
 from server.results import endpoints as results
+from server.results import own_tables
 from server.results.kinds import results_counted_ahead
 from server.studies import clip_endpoints, library
 from server.studies import endpoints as studies
@@ -60,7 +60,7 @@ def _routers() -> tuple[APIRouter, ...]:
         workspace_endpoints.workspace_router,
         workspace_endpoints.grant_router,
         studies.router,
-        demo_builds.router,
+        results.build_router,
         clip_endpoints.upload_router,
         studies.life_router,
         studies.link_router,

@@ -7,19 +7,16 @@ from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
-from fastapi import APIRouter
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
 
 from experiments.errors import InputError
 from experiments.load import DEMOS, SHIPPED
 from experiments.manifest import MANIFEST_NAME
-from server.accounts.access import Viewer
 from server.accounts.audit import record
-from server.accounts.workspaces import Uploader
-from server.context import ServicesDep
+from server.accounts.identity import Identity
 from server.core.db import Database
-from server.core.errors import ERROR_RESPONSES, Conflict, NotFound
+from server.core.errors import Conflict, NotFound
 from server.core.locks import Locks
 from server.core.settings import Settings
 from server.core.values import new_public_id, now
@@ -31,8 +28,6 @@ KIND = "demo clips"
 RENDERS_WITH = "skia"
 """The module of the extra `render` without which no clip can be drawn."""
 NOTED_EVERY_S = 1.0
-
-router = APIRouter(prefix="/api/admin/experiments", tags=["studies"], responses=ERROR_RESPONSES)
 
 
 class ClipBuild(BaseModel):
@@ -51,25 +46,31 @@ class ClipBuilds(BaseModel):
     builds: list[ClipBuild]
 
 
-@router.get("/builds")
-def list_clip_builds(services: ServicesDep, _identity: Viewer) -> ClipBuilds:
+def clip_builds(database: Database, locks: Locks) -> ClipBuilds:
     """How far the clips of shipped experiments are."""
-    with services.database.read() as session:
+    with database.read() as session:
         latest = _latest_jobs(session)
-        builds = [_build_out(services.locks, name, job) for name, job in latest.items()]
+        builds = [_build_out(locks, name, job) for name, job in latest.items()]
     return ClipBuilds(lacks=_what_is_missing(), builds=builds)
 
 
-@router.post("/{experiment}/builds", status_code=202)
-def begin_clip_build(services: ServicesDep, identity: Uploader, experiment: str) -> ClipBuild:
-    """Build the clips of a shipped experiment; one experiment at a time, as it takes every core."""
+def start_clip_build(
+    database: Database, settings: Settings, locks: Locks, experiment: str, identity: Identity
+) -> ClipBuild:
+    """Begin to build the clips of a shipped experiment; one experiment at a time, as it takes every core.
+
+    Raises
+    ------
+    NotFound, Conflict
+        There is no such experiment; clips cannot be rendered here, or others are being built.
+    """
     if experiment not in (*SHIPPED, *DEMOS):
         raise NotFound(f"There is no shipped experiment '{experiment}'.")
     if missing := _what_is_missing():
         raise Conflict(missing)
-    with services.database.write() as session:
+    with database.write() as session:
         for name, earlier in _latest_jobs(session).items():
-            if is_under_way(services.locks, earlier):
+            if is_under_way(locks, earlier):
                 raise Conflict(f"The clips of '{name}' are being built. Wait until they are done.")
         parameters = {"experiment": experiment}
         job = Job(
@@ -82,10 +83,9 @@ def begin_clip_build(services: ServicesDep, identity: Uploader, experiment: str)
         session.add(job)
         record(session, identity, "clips built", "experiment", experiment)
         session.flush()
-        begun = _build_out(services.locks, experiment, job)
+        begun = _build_out(locks, experiment, job)
         public_id = job.public_id
-    work = partial(build_clips, services.database, services.settings, public_id, experiment)
-    in_background(services.database, services.locks, public_id, work)
+    in_background(database, locks, public_id, partial(build_clips, database, settings, public_id, experiment))
     return begun
 
 

@@ -13,6 +13,7 @@ from pydantic import BaseModel, Field
 from server.accounts.access import Eraser, Myself, PersonalReader, Viewer, Writer, identify
 from server.accounts.audit import record
 from server.accounts.identity import Identity, NotAllowed, NotSignedIn, SecondFactorNeeded
+from server.accounts.workspaces import Uploader
 from server.context import ServicesDep
 from server.core.changes import Changes, Stopping
 from server.core.db import Database
@@ -27,6 +28,7 @@ from server.results import monitor as monitor_service
 from server.results import replay as replay_service
 from server.results import runs as run_service
 from server.results.cache import Revision
+from server.results.demo_builds import ClipBuild, ClipBuilds, clip_builds, start_clip_build
 from server.results.monitor import failing_clips
 from server.results.schemas import (
     AnyResults,
@@ -353,3 +355,20 @@ def get_methods_text(
             session, find_study(session, study, identity, "view"), origin, series
         )
     return Response(methods.text(), media_type="text/plain; charset=utf-8")
+
+
+# Clips of shipped experiments, built by the buttons of New study.
+
+build_router = APIRouter(prefix="/api/admin/experiments", tags=["studies"], responses=ERROR_RESPONSES)
+
+
+@build_router.get("/builds")
+def list_clip_builds(services: ServicesDep, _identity: Viewer) -> ClipBuilds:
+    """How far the clips of shipped experiments are."""
+    return clip_builds(services.database, services.locks)
+
+
+@build_router.post("/{experiment}/builds", status_code=202)
+def begin_clip_build(services: ServicesDep, identity: Uploader, experiment: str) -> ClipBuild:
+    """Build the clips of a shipped experiment; one experiment at a time, as it takes every core."""
+    return start_clip_build(services.database, services.settings, services.locks, experiment, identity)
