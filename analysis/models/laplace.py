@@ -176,11 +176,15 @@ class LaplaceLikelihood:
         self.u = np.zeros((self.data.n_participants, self.data.z.shape[1]))
         self.v = np.zeros(self.data.n_items)
 
-    def _trials(self, p: Parameters, u: Floats, v: Floats) -> Trials:
-        """Trials where the random effects are u (people, c) and v (items,)."""
+    def predictor(self, p: Parameters, u: Floats, v: Floats) -> Floats:
+        """Linear predictor of each trial (n,) where the random effects are u (people, c) and v (items,)."""
         d = self.data
         of_people = np.einsum("tc,tc->t", d.z * p.sd[d.term], u[d.participant])
-        return Trials(p.thresholds, d.category, d.x @ p.beta + of_people + p.sd[-1] * v[d.item])
+        return np.asarray(d.x @ p.beta + of_people + p.sd[-1] * v[d.item], dtype=np.float64)
+
+    def _trials(self, p: Parameters, u: Floats, v: Floats) -> Trials:
+        """Trials where the random effects are u (people, c) and v (items,)."""
+        return Trials(p.thresholds, self.data.category, self.predictor(p, u, v))
 
     def _carried(self, scaled: Floats, sd_item: float, values: Floats) -> tuple[Floats, Floats]:
         """L' of values of trials (n,): to participants (people, c) and items (items,)."""

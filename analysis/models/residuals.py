@@ -84,16 +84,12 @@ def mixed_checks(
 def ordinal_checks(data: OrdinalData, p: Parameters) -> ResidualChecks:
     """Checks of a cumulative-link mixed model at its estimates; each data set has its own modes."""
     random, likelihood = np.random.default_rng(SEED), LaplaceLikelihood(data)
-    scaled, fixed = data.z * p.sd[data.term], data.x @ p.beta
+    fixed = data.x @ p.beta
     edges = np.concatenate([[-np.inf], p.thresholds, [np.inf]])
-
-    def predictor(u: Floats, v: Floats) -> Floats:
-        of_people = np.einsum("tc,tc->t", scaled, u[data.participant])
-        return np.asarray(fixed + of_people + p.sd[-1] * v[data.item], dtype=np.float64)
 
     def drawn(of: LaplaceLikelihood) -> tuple[Floats, Floats]:
         of.evaluate(p)
-        fitted = predictor(of.u, of.v)
+        fitted = of.predictor(p, of.u, of.v)
         low, high = (special.expit(edges[of.data.category + step] - fitted) for step in (0, 1))
         inside = low + random.random(len(fitted)) * (high - low)
         # The quantiles of 0 and 1 are infinite.
@@ -102,7 +98,8 @@ def ordinal_checks(data: OrdinalData, p: Parameters) -> ResidualChecks:
     fitted, observed = drawn(likelihood)
     sets = [observed]
     for _ in range(_simulations(len(fixed), SIMULATIONS_ORDINAL)):
-        eta = predictor(random.normal(size=likelihood.u.shape), random.normal(size=likelihood.v.shape))
+        effects = (random.normal(size=own.shape) for own in (likelihood.u, likelihood.v))
+        eta = likelihood.predictor(p, *effects)
         # The category is the number of thresholds below the latent value.
         category = np.searchsorted(p.thresholds, eta + random.logistic(size=len(eta)))
         sets.append(drawn(LaplaceLikelihood(replace(data, category=category)))[1])

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from analysis.read.number_columns import MISSING_MARKS, holds_numbers
 from analysis.read.text_table import EMPTY, read_text_table
 from analysis.read.wide import wide_hint
 from experiments.columns.column import OLD_ORDER
 from table_files import InputError, counted
 
-MISSING = EMPTY | {"NA", "na", "N/A", "n/a", "."}
+MISSING = EMPTY | MISSING_MARKS
 MAX_LEVELS = 12
 """A factor of a factorial design rarely has more."""
 SHOWN_VALUES = 6
@@ -157,7 +158,7 @@ def guess_roles(path: Path) -> TableGuess:
     """
     table = read_text_table(path, None, copies=False)
     texts = {name: table.columns[name].astype(str) for name in table.header}
-    numbers = {name: _is_number(column) for name, column in texts.items()}
+    numbers = {name: holds_numbers(column.unique()) for name, column in texts.items()}
     roles = _named_roles(texts, numbers)
     command = _fitting_command(texts, numbers, roles)
     if command:
@@ -167,13 +168,6 @@ def guess_roles(path: Path) -> TableGuess:
     hint = "" if command else wide_hint(table.header)
     decisions = [*table.decisions, *([hint.removeprefix("; ")] if hint else [])]
     return TableGuess(len(table.columns), columns, command, tuple(decisions))
-
-
-def _is_number(column: "pd.Series[str]") -> bool:
-    values = pd.Series(column.unique())
-    values = values[~values.isin(MISSING)]
-    parsed = pd.to_numeric(values.str.replace(",", ".", regex=False), errors="coerce")
-    return bool(len(values)) and bool(parsed.notna().all())
 
 
 def _present(column: "pd.Series[str]") -> "pd.Series[str]":

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.models.columns import split_covariates
-from analysis.read.number_columns import IN_COVARIATE, MISSING_MARKS, numbers, unusual_numbers
+from analysis.read.number_columns import IN_COVARIATE, holds_numbers, numbers, unusual_numbers
 from analysis.read.reading import EXPORT_COLUMNS, rows_that_count
 from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
@@ -130,11 +130,5 @@ def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequ
 def header_and_numbers(path: Path) -> tuple[tuple[str, ...], frozenset[str]]:
     """The columns of a table, and those that hold numbers alone (and missing marks)."""
     table = read_text_table(path, None, copies=False)
-    of_numbers = set()
-    for name in table.header:
-        texts = pd.Series(table.columns[name].cat.categories.astype(str))
-        # A comma may be the decimal sign.
-        values = pd.to_numeric(texts[~texts.isin(MISSING_MARKS)].str.replace(",", "."), errors="coerce")
-        if len(values) and values.notna().all():
-            of_numbers.add(name)
+    of_numbers = (name for name in table.header if holds_numbers(table.columns[name].cat.categories))
     return table.header, frozenset(of_numbers)

@@ -1,8 +1,10 @@
 """Columns of numbers in a table of text: decimal commas, marks and codes for missing, unusual ratings."""
 
 import re
+from collections.abc import Iterable
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.text_table import TextTable, name_lines
@@ -23,6 +25,13 @@ SIZE_MIN = 1e-100
 """Numbers all below it, or one above its inverse, have sums of squares that a float64 cannot tell apart."""
 IN_COVARIATE = "correct them or leave them empty"
 """What to do about unusual numbers where there is no scale that would reject them."""
+
+
+def holds_numbers(texts: Iterable[object]) -> bool:
+    """Whether texts are numbers alone, with a decimal point or comma, apart from marks of missing values."""
+    given = pd.Series([str(text) for text in texts if str(text) not in MISSING_MARKS], dtype=object)
+    values = pd.to_numeric(given.str.replace(",", ".", regex=False), errors="coerce") if len(given) else given
+    return bool(len(values)) and bool(values.notna().all())
 
 
 def numbers(table: TextTable, name: str) -> NDArray[np.float64]:

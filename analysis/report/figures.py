@@ -28,8 +28,10 @@ from analysis.report.pictures import (
     COLOURS,
     MARKERS,
     STYLE,
+    draw_estimates,
     in_both_formats,
     new_figure,
+    spread_offsets,
     wrap_text,
     write_note,
 )
@@ -180,7 +182,9 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     offsets = (np.arange(n_shades) - (n_shades - 1) / 2) * _SPREAD / n_shades
     room = _SPREAD / n_shades
     jitter = (
-        0.16 * _jitter(len(values)) - 0.24 if spec.style == "points" else 0.34 * _jitter(len(values))
+        0.16 * spread_offsets(len(values)) - 0.24
+        if spec.style == "points"
+        else 0.34 * spread_offsets(len(values))
     ) * room
     for shade in range(n_shades):
         at = np.arange(n_groups) + offsets[shade]
@@ -291,14 +295,6 @@ def _name(analysis: Analysis, levels: dict[str, str]) -> str:
     return "\n".join(analysis.labels.level(factor, level) for factor, level in levels.items())
 
 
-def _jitter(n: int) -> Floats:
-    """Evenly spread offsets in [-1, 1] in an order that looks random and is not."""
-    # Steps of the golden ratio fill an interval evenly at any number.
-    golden = np.arange(1, n + 1) * 0.6180339887498949
-    spread: Floats = 2 * (golden - np.floor(golden)) - 1
-    return spread
-
-
 def _asked(what: str, scale: RatedScale, language: str) -> str:
     """What the axis of ratings is called: the ends of the scale as participants read them."""
     low = f"{scale.minimum:g} {scale.low.get(language, '')}".strip()
@@ -335,32 +331,23 @@ NUMBERED_MAX = 14
 
 def draw_abilities(result: PairsResult, synthetic: bool, people: int) -> Picture:
     """Abilities against their mean with 95% intervals, the ablest on top."""
-    ranked = sorted(result.items, key=lambda item: (-item.rank, item.name))
-    with mpl.rc_context(STYLE):
-        figure = new_figure(7.2, 1.5 + 0.32 * len(ranked))
-        axes = figure.add_subplot()
-        rows = range(len(ranked))
-        axes.axvline(0, color="#999999", linewidth=0.8, zorder=1)
-        axes.errorbar(
-            [item.centred for item in ranked],
-            rows,
-            xerr=[float(stats.norm.ppf(0.975)) * item.se_centred for item in ranked],
-            linestyle="none",
-            marker="o",
-            color=COLOURS[0],
-            capsize=3.2,
-            elinewidth=1.3,
-            markersize=5,
-        )
-        axes.set_yticks(rows, [item.name for item in ranked])
-        axes.set_xlabel(f"Ability relative to the mean, {result.scale}")
-        axes.grid(axis="x", linewidth=0.4, alpha=0.5)
-        axes.set_axisbelow(True)
-        note = f"N = {people}, {result.n_comparisons} comparisons. Bars: 95% intervals, sum-to-zero."
-        write_note(figure, note, synthetic, "comparisons")
-        best = ranked[-1].name
-        alt = f"Abilities of {len(ranked)} cells with 95% intervals; {best} was chosen most often"
-        return Picture("figure-abilities", "Abilities", alt, *in_both_formats(figure))
+    ranked = sorted(result.items, key=lambda item: (-item.rank, item.name))[::-1]
+    reach = float(stats.norm.ppf(0.975))
+    rows = [
+        (one.name, one.centred, one.centred - reach * one.se_centred, one.centred + reach * one.se_centred)
+        for one in ranked
+    ]
+    return draw_estimates(
+        "figure-abilities",
+        "Abilities",
+        f"Ability relative to the mean, {result.scale}",
+        rows,
+        f"N = {people}, {result.n_comparisons} comparisons. Bars: 95% intervals, sum-to-zero.",
+        synthetic,
+        what="comparisons",
+        alt=f"Abilities of {len(rows)} cells with 95% intervals; {ranked[0].name} was chosen most often",
+        reference=0.0,
+    )
 
 
 def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Picture:

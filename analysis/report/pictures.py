@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,11 +18,13 @@ from matplotlib.ticker import FixedFormatter, FuncFormatter
 from numpy.typing import NDArray
 from scipy import special
 
-from analysis.power.simulate import PowerResult
 from analysis.report.contents import Picture
 from experiments.errors import InputError
 from experiments.files import whole_file
 from table_files import counted
+
+if TYPE_CHECKING:  # every figure would wait for what simulations import
+    from analysis.power.simulate import PowerResult
 
 Floats = NDArray[np.float64]
 
@@ -171,6 +173,14 @@ def _drawn(by: Callable[..., None], into: BytesIO, metadata: dict[str, None]) ->
 # Figures of one command: estimates with intervals, and every person's mean in each level.
 
 
+def spread_offsets(n: int) -> Floats:
+    """Evenly spread offsets in [-1, 1] in an order that looks random and is not."""
+    # Steps of the golden ratio fill an interval evenly at any number.
+    golden = np.arange(1, n + 1) * 0.6180339887498949
+    spread: Floats = 2 * (golden - np.floor(golden)) - 1
+    return spread
+
+
 def draw_estimates(
     key: str,
     caption: str,
@@ -178,6 +188,10 @@ def draw_estimates(
     rows: Sequence[tuple[str, float, float, float]],
     note: str,
     synthetic: bool,
+    *,
+    what: str = "ratings",
+    alt: str = "",
+    reference: float | None = None,
 ) -> Picture:
     """Estimates with intervals, the first on top.
 
@@ -192,23 +206,31 @@ def draw_estimates(
         Below the figure: what the bars are.
     synthetic : bool
         Whether no person gave the data; marked.
+    what : str
+        What people gave.
+    alt : str
+        The figure in words; by default the range of the estimates.
+    reference : float, optional
+        Where a line is drawn, such as at no difference.
     """
     ends = list(reversed(rows))
     with mpl.rc_context(STYLE):
         figure = new_figure(7.2, 1.5 + 0.32 * len(ends))
         axes = figure.add_subplot()
+        if reference is not None:
+            axes.axvline(reference, color="#999999", linewidth=0.8, zorder=1)
         values = np.array([row[1:] for row in ends], dtype=np.float64)
         # A limit that does not exist leaves the point without its bar on that side.
         reach = np.nan_to_num(np.abs(values[:, 1:] - values[:, :1]), posinf=0.0)
-        bars: dict[str, Any] = {"linestyle": "none", "marker": "o", "color": COLOURS[0], "capsize": 3.2}
-        axes.errorbar(values[:, 0], range(len(ends)), xerr=reach.T, **bars)
-        axes.set_yticks(range(len(ends)), [wrap_text(row[0], 40) for row in ends])
+        bars: dict[str, Any] = {"color": COLOURS[0], "capsize": 3.2, "elinewidth": 1.3, "markersize": 5}
+        axes.errorbar(values[:, 0], range(len(ends)), xerr=reach.T, linestyle="none", marker="o", **bars)
+        axes.set_yticks(range(len(ends)), [row[0] for row in ends])
         axes.set_xlabel(axis)
         axes.grid(axis="x", linewidth=0.4, alpha=0.5)
         axes.set_axisbelow(True)
-        write_note(figure, note, synthetic)
-        ends_said = f"from {values[:, 0].min():.3g} to {values[:, 0].max():.3g}"
-        alt = f"{axis}: {counted(len(rows), 'estimate')} with intervals, {ends_said}"
+        write_note(figure, note, synthetic, what)
+        span = f"from {values[:, 0].min():.3g} to {values[:, 0].max():.3g}"
+        alt = alt or f"{axis}: {counted(len(rows), 'estimate')} with intervals, {span}"
         return Picture(key, caption, alt, *in_both_formats(figure))
 
 
@@ -230,9 +252,7 @@ def draw_people(
         figure = new_figure(max(3.6, 1.4 + 0.9 * len(levels)), 4.0)
         axes = figure.add_subplot()
         for at, (_, values) in enumerate(levels):
-            spread = 0.16 * np.linspace(-1, 1, len(values)) if len(values) > 1 else np.zeros(1)
-            # Neighbors in the file would lie side by side: a golden step scatters them, the same in each run.
-            offsets = spread[np.argsort((np.arange(len(values)) * 0.618033988749895) % 1)]
+            offsets = 0.16 * spread_offsets(len(values))
             faint: dict[str, Any] = {"alpha": 0.3, "markersize": 3.5, "markeredgewidth": 0}
             axes.plot(at + offsets, values, "o", color=COLOURS[0], **faint)
             if center == "median":
@@ -258,7 +278,7 @@ def draw_people(
 FORMATS = (".png", ".svg", ".pdf")
 
 
-def draw_power(result: PowerResult, target: float = 0.8) -> Figure:
+def draw_power(result: "PowerResult", target: float = 0.8) -> Figure:
     """Power against n, a line an effect, with two standard errors of the simulation either side."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 4.2), layout="constrained")
@@ -285,7 +305,7 @@ def draw_power(result: PowerResult, target: float = 0.8) -> Figure:
     return figure
 
 
-def save_power_figure(result: PowerResult, path: Path, target: float = 0.8) -> None:
+def save_power_figure(result: "PowerResult", path: Path, target: float = 0.8) -> None:
     """Write the figure as PNG, SVG or PDF by the file's ending, whole or not at all."""
     if path.suffix.lower() not in FORMATS:
         raise InputError(f"{path}: expected a name ending in {', '.join(FORMATS)}")

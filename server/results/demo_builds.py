@@ -1,11 +1,9 @@
 """Clips of shipped experiments, built in the background by `stimuli build`: the buttons of New study."""
 
 import subprocess
-import sys
 import time
 from functools import partial
 from importlib.util import find_spec
-from pathlib import Path
 
 from pydantic import BaseModel, Field
 from sqlalchemy.orm import Session
@@ -22,9 +20,9 @@ from server.core.settings import Settings
 from server.core.values import new_public_id, now
 from server.models import Job
 from server.results import repository
-from server.results.jobs import in_background, is_under_way, job_state, last_line, note
+from server.results.jobs import in_background, is_under_way, job_state, last_line, note, own_program
 
-KIND = "demo clips"
+KIND, PROGRAM = "demo clips", "stimuli"
 RENDERS_WITH = "skia"
 """The module of the extra `render` without which no clip can be drawn."""
 NOTED_EVERY_S = 1.0
@@ -90,13 +88,9 @@ def start_clip_build(
 
 
 def _what_is_missing() -> str:
-    if find_spec(RENDERS_WITH) is not None and _stimuli_program().is_file():
+    if find_spec(RENDERS_WITH) is not None and own_program(PROGRAM).is_file():
         return ""
     return "This server cannot render clips. Its operator can install Palpebra with the extra 'render'."
-
-
-def _stimuli_program() -> Path:
-    return Path(sys.executable).with_name("stimuli.exe" if sys.platform == "win32" else "stimuli")
 
 
 def _latest_jobs(session: Session) -> dict[str, Job]:
@@ -115,7 +109,7 @@ def build_clips(database: Database, settings: Settings, public_id: str, experime
     folder = settings.stimuli_folder / experiment
     folder.parent.mkdir(parents=True, exist_ok=True)
     command = [
-        str(_stimuli_program()),
+        str(own_program(PROGRAM)),
         "build",
         experiment,
         "--out",

@@ -40,7 +40,7 @@ def run_analysis(
     manifest: Path | None = None,
 ) -> str:
     """Write the report into `folder`; return the analysis' own error line where it failed, else ''."""
-    command = [analysis_program(), "run", str(definition), "--csv", str(answers)]
+    command = [str(own_program("analysis")), "run", str(definition), "--csv", str(answers)]
     command += ["--runs", str(runs)]
     command += ["--origin", origin, "--series", str(series), "--out", str(folder)]
     command += [] if sensitivity else ["--no-sensitivity"]
@@ -54,9 +54,9 @@ def run_analysis(
     return (reason or f"the analysis ended with code {done.returncode}")[:500]
 
 
-def analysis_program() -> str:
-    """The command `analysis` of this installation."""
-    return str(Path(sys.executable).with_name("analysis.exe" if sys.platform == "win32" else "analysis"))
+def own_program(name: str) -> Path:
+    """A command of this installation, such as `analysis`."""
+    return Path(sys.executable).with_name(f"{name}.exe" if sys.platform == "win32" else name)
 
 
 def last_line(printed: str) -> str:

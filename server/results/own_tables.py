@@ -21,7 +21,7 @@ from pydantic import Base64Bytes, BaseModel, ConfigDict, Field
 
 from server.accounts.access import Writer
 from server.core.errors import ERROR_RESPONSES, ApiError, Invalid
-from server.results.jobs import analysis_program, last_line
+from server.results.jobs import last_line, own_program
 
 router = APIRouter(prefix="/api/admin/analyses", tags=["analyses"], responses=ERROR_RESPONSES)
 ENDINGS = (".csv", ".tsv", ".txt", ".xlsx", ".sav", ".json")
@@ -173,7 +173,7 @@ def _table_folder(body: OwnTable) -> Iterator[tuple[Path, Path]]:
 def _run_analysis(arguments: Sequence[str], table: Path, name: str) -> None:
     """Run `analysis` in the table's folder; Invalid with its error line where it refuses the table."""
     with subprocess.Popen(  # noqa: S603 - the program of this installation
-        [analysis_program(), *arguments],
+        [str(own_program("analysis")), *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         cwd=table.parent,

@@ -2,8 +2,9 @@
 
 import type { Schemas } from "../api";
 import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "@mantine/core";
-import { useState, type ReactNode } from "react";
+import type { ReactNode } from "react";
 import { onDemand } from "../ui/Answer";
+import { DropZone } from "../ui/DropZone";
 import { counted } from "../ui/format";
 import { LeftOut, type Upload } from "./useUpload";
 
@@ -42,22 +43,9 @@ interface Props {
 }
 
 export function UploadClips({ upload, label = "Clips", description, accept = `.zip,${ENDINGS},.csv` }: Props) {
-  const [over, setOver] = useState(false);
   return (
     <Stack gap="sm">
-      <div
-        className={over ? "drop-here over" : "drop-here"}
-        onDragOver={(event) => {
-          event.preventDefault();
-          setOver(true);
-        }}
-        onDragLeave={() => setOver(false)}
-        onDrop={(event) => {
-          event.preventDefault();
-          setOver(false);
-          if (event.dataTransfer.files.length > 0) upload.send([...event.dataTransfer.files]);
-        }}
-      >
+      <DropZone onDrop={upload.send}>
         <FileInput
           label={label}
           description={
@@ -70,7 +58,7 @@ export function UploadClips({ upload, label = "Clips", description, accept = `.z
           value={[]}
           onChange={(files) => files.length > 0 && upload.send(files)}
         />
-      </div>
+      </DropZone>
       <Select
         label="Frame rate"
         description="A video with a variable rate gets its most common rate. Frames are repeated or dropped, never blended."

@@ -4,6 +4,7 @@ import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { ErrorAlert } from "../ui/Answer";
+import { DropZone } from "../ui/DropZone";
 import { counted } from "../ui/format";
 
 type Columns = Schemas["OwnColumns"];
@@ -57,7 +58,6 @@ async function readFile(file: File): Promise<Chosen> {
 }
 
 export function AnalyzePage() {
-  const [over, setOver] = useState(false);
   const [command, setCommand] = useState("");
   const [roles, setRoles] = useState<Record<string, string>>({});
   const analysis = useMutation({
@@ -90,20 +90,7 @@ export function AnalyzePage() {
         For ratings, comparisons or answers that you already have: one row per trial. The table is analyzed on this server and deleted
         afterwards.
       </Text>
-      <div
-        className={over ? "drop-here over" : "drop-here"}
-        onDragOver={(event) => {
-          event.preventDefault();
-          setOver(true);
-        }}
-        onDragLeave={() => setOver(false)}
-        onDrop={(event) => {
-          event.preventDefault();
-          setOver(false);
-          const [file] = event.dataTransfer.files;
-          if (file !== undefined) table.mutate(file);
-        }}
-      >
+      <DropZone onDrop={(files) => files[0] !== undefined && table.mutate(files[0])}>
         <FileInput
           label="Table"
           description="CSV, Excel, SPSS or JSON, at most 12 MB. Choose a file, or drop it here."
@@ -111,13 +98,14 @@ export function AnalyzePage() {
           accept=".csv,.tsv,.txt,.xlsx,.sav,.json"
           onChange={(file) => file !== null && table.mutate(file)}
         />
-      </div>
+      </DropZone>
       {table.isPending && <Text role="status">Reading the table…</Text>}
       {table.error !== null && <ErrorAlert error={table.error} />}
       {table.data !== undefined && (
         <>
           <ColumnRoles
             columns={table.data.columns}
+            missing={missing}
             command={command}
             setCommand={changing(setCommand)}
             roles={roles}
@@ -139,17 +127,18 @@ export function AnalyzePage() {
 
 interface RolesProps {
   columns: Columns;
+  /** Roles that the analysis needs and no column has. */
+  missing: string[];
   command: string;
   setCommand: (command: string) => void;
   roles: Record<string, string>;
   setRoles: (roles: Record<string, string>) => void;
 }
 
-function ColumnRoles({ columns, command, setCommand, roles, setRoles }: RolesProps) {
+function ColumnRoles({ columns, missing, command, setCommand, roles, setRoles }: RolesProps) {
   const [all, setAll] = useState(false);
   const { needed = [], optional = [] } = columns.commands[command] ?? {};
   const possible = [...needed, ...optional];
-  const missing = needed.filter((role) => !Object.values(roles).includes(role));
   const likely = columns.columns.filter(({ name, role }) => role !== "" || roles[name] || columns.columns.length <= 12);
   const shown = all || likely.length === 0 ? columns.columns : likely;
   return (
