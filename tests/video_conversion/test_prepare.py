@@ -1,5 +1,7 @@
 """Videos of every kind become clips whose frames are those of the original, or are refused in one line."""
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +132,32 @@ def packets(path: Path) -> list[bytes]:
 def test_the_same_file_gives_the_same_clip(tmp_path: Path) -> None:
     path = write_video(tmp_path / "a.webm", "libvpx-vp9")
     assert prepared(tmp_path, path)[0] == prepared(tmp_path, path)[0]
+
+
+REPEATED = """
+import random, sys
+from pathlib import Path
+from experiments.manifest import file_sha256
+from video_conversion.conversion import conversion_of, encode
+from video_conversion.video_file import examine
+video, clip = Path(sys.argv[1]), Path(sys.argv[2])
+conversion, made, blocks = conversion_of(examine(video), None), set(), {}
+chance = random.Random(1)
+for _ in range(400):
+    for _ in range(20):
+        blocks[chance.randrange(60)] = chance.randbytes(int(2 ** chance.uniform(4, 16)))
+    encode(video, conversion, clip)
+    made.add(file_sha256(clip))
+print(len(made))
+"""
+
+
+def test_the_same_file_gives_the_same_clip_in_memory_used_before(tmp_path: Path) -> None:
+    """Memory that is handed out again holds old data, which libx264 must not read."""
+    path = write_video(tmp_path / "a.webm", "libvpx-vp9")
+    command = [sys.executable, "-c", REPEATED, str(path), str(tmp_path / "clip.mp4")]
+    made = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert made.stdout.strip() == "1"
 
 
 def cut_short(path: Path) -> Path:
