@@ -14,15 +14,28 @@ from experiments.errors import InputError
 
 
 def temporary_beside(path: Path, suffix: str = "") -> Path:
-    """Return a name next to `path` for unfinished output; the folder must exist and be writable."""
-    folder = path.parent
-    if not folder.is_dir():
-        raise InputError(f"{path}: the folder {folder} does not exist; create it first")
+    """Return a name next to `path` for unfinished output; folders that are missing are created."""
+    check_target(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path.parent / f".{path.name}.{os.getpid()}.part{suffix}"
+
+
+def check_target(path: Path) -> None:
+    """Refuse a file that cannot be written, before the work begins; nothing is created."""
+    check_folder(path.parent)
     if path.is_dir():
         raise InputError(f"{path}: expected a file name, got a folder")
-    if not os.access(folder, os.W_OK):
-        raise InputError(f"{path}: the folder {folder} is not writable")
-    return folder / f".{path.name}.{os.getpid()}.part{suffix}"
+
+
+def check_folder(folder: Path) -> None:
+    """Refuse a folder that cannot be written to or created, before the work begins; nothing is created."""
+    ancestor = folder
+    while not ancestor.exists() and ancestor != ancestor.parent:
+        ancestor = ancestor.parent
+    if not ancestor.is_dir():
+        raise InputError(f"{folder}: expected a folder, but {ancestor} is a file")
+    if not os.access(ancestor, os.W_OK):
+        raise InputError(f"{folder}: the folder {ancestor} is not writable")
 
 
 def check_targets(outputs: Iterable[Path | None], inputs: Iterable[Path | None] = ()) -> None:
@@ -30,7 +43,7 @@ def check_targets(outputs: Iterable[Path | None], inputs: Iterable[Path | None] 
     taken = [path.resolve() for path in inputs if path is not None]
     for path in outputs:
         if path is not None:
-            temporary_beside(path)
+            check_target(path)
             if path.resolve() in taken:
                 raise InputError(f"{path}: already used in this call; give every output a unique name")
             taken.append(path.resolve())

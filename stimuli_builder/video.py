@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from experiments.files import remove_quietly, temporary_beside
+from experiments.files import check_target, remove_quietly, temporary_beside
 
 # When the frames of a video are shown, from its packets; a varying rate; a truncated end.
 
@@ -445,7 +445,7 @@ ENDINGS = (".mp4", ".m4v", ".mov", ".mkv")
 
 def check_video_name(path: Path) -> None:
     """Refuse a name that cannot be written as video, before any work is done."""
-    temporary_beside(path)
+    check_target(path)
     if path.suffix.lower() not in ENDINGS:
         raise InputError(f"{path}: cannot be written as video; use a name in {', '.join(ENDINGS)}")
 

@@ -31,7 +31,6 @@ def prepare(path: Path, clips: Path, asked_fps: float | None) -> Prepared:
     conversion = conversion_of(video, asked_fps)
     if not conversion.changes:
         return _record(path, path, path.name, conversion, asked_fps, None)
-    clips.mkdir(exist_ok=True)
     temporary = temporary_beside(clips / "clip.mp4", ".mp4")
     try:
         psnr_db = encode(path, conversion, temporary) if conversion.encodes else None

@@ -10,7 +10,6 @@ from analysis.commands.output import (
     JsonOption,
     LevelsOption,
     VerifyOption,
-    check_folder,
     equivalence_bounds,
     names_in,
     progress_spinner,
@@ -20,6 +19,7 @@ from analysis.commands.output import (
     show,
 )
 from experiments.errors import InputError
+from experiments.files import check_folder
 
 
 def register_anova(app: typer.Typer) -> None:

@@ -11,12 +11,12 @@ import typer
 
 from analysis.commands.output import (
     JsonOption,
-    check_folder,
     progress_spinner,
     save_json,
     show_tables,
     show_text,
 )
+from experiments.files import check_folder
 
 if TYPE_CHECKING:
     from analysis.capsule import FileComparison

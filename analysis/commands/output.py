@@ -1,6 +1,5 @@
 """What the commands share: the option `--scale`, tables, JSON and a spinner."""
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -117,17 +116,6 @@ def show(contents: "Contents") -> None:
                 typer.echo("\n" + "\n".join(wrap(folded)))
             else:
                 typer.echo("\n" + as_text(table))
-
-
-def check_folder(folder: Path) -> None:
-    """Reject a folder that cannot be created or written to before the work begins."""
-    ancestor = folder
-    while not ancestor.exists() and ancestor != ancestor.parent:
-        ancestor = ancestor.parent
-    if not ancestor.is_dir():
-        raise InputError(f"{folder}: expected a folder, but {ancestor} is a file")
-    if not os.access(ancestor, os.W_OK):
-        raise InputError(f"{folder}: the folder {ancestor} cannot be written to")
 
 
 def save_json(path: Path | None, numbers: dict[str, Any], synthetic: bool | None = None) -> None:

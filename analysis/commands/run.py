@@ -9,13 +9,13 @@ import typer
 from analysis.commands.output import (
     JsonOption,
     VerifyOption,
-    check_folder,
     progress_spinner,
     save_json,
     save_report,
     show,
 )
 from experiments.errors import InputError
+from experiments.files import check_folder
 
 if TYPE_CHECKING:
     from experiments.declaration.experiment import Experiment

@@ -87,8 +87,6 @@ def power(
     sizes = sample_sizes(n)
     plan = make_plan(experiment, means=mean or (), effects=effect or (), scale=scale)
     figure = plot or Path("out") / "analysis" / experiment / "power.png"
-    if plot is None:
-        figure.parent.mkdir(parents=True, exist_ok=True)
     with bar("simulating", len(sizes) * simulations) as advance:
         result = simulate_power(plan, sizes, simulations, alpha, seed, statistic.value, advance)
     save_power_figure(result, figure, target)

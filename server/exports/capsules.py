@@ -455,7 +455,6 @@ def _build(
 ) -> None:
     """The background thread's work."""
     target = _zip_of(settings, public_id)
-    target.parent.mkdir(parents=True, exist_ok=True)
     with _one_at_a_time:
         note(database, public_id, status="running", started_at=now())
         made = build_capsule(

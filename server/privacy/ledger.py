@@ -118,9 +118,7 @@ def add_to_ledger(settings: Settings, further: bytes) -> None:
     both = merge_ledgers(ledger_content(settings), further)
     if both == ledger_content(settings):
         return
-    path = ledger_path(settings)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with whole_private_file(path) as stream:
+    with whole_private_file(ledger_path(settings)) as stream:
         stream.write(both)
 
 

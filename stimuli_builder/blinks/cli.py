@@ -7,6 +7,7 @@ import typer
 
 from experiments.command_groups import command_group
 from experiments.errors import InputError
+from experiments.files import check_folder
 
 if TYPE_CHECKING:
     from stimuli_builder.blinks.labelling import LabelOptions
@@ -475,8 +476,7 @@ def build_library(
     from stimuli_builder.blinks.library.build import recorded_profiles, write_model, write_profiles
 
     folder = out or LIBRARY_FOLDER
-    if not folder.is_dir():
-        raise InputError(f"{folder}: the folder does not exist; create it first")
+    check_folder(folder)
     entries = read_recordings(recordings or RECORDINGS_FILE)
     measured = [profile for entry in entries for profile in recorded_profiles(entry, data)]
     write_profiles(folder, measured, entries)

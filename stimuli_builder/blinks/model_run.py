@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.errors import InputError, counted, did_you_mean
-from experiments.files import temporary_beside, whole_text
+from experiments.files import check_target, whole_text
 from stimuli_builder.blinks.blink_model import (
     TEXTBOOK_KINDS,
     BlinkModel,
@@ -220,6 +220,6 @@ def _model(path: Path | None, pca: bool) -> BlinkModel | PhaseModel:
 def _check_outputs(out: Path | None, plot: Path | None) -> None:
     for path in (out, plot):
         if path is not None:
-            temporary_beside(path)
+            check_target(path)
     if plot is not None:
         check_figure_name(plot)

@@ -236,8 +236,7 @@ def _toml_value(value: Any) -> str:
 
 
 def write_bytes(file: Path, content: bytes) -> None:
-    """Write a file whole, in a folder that is made where it is not there."""
-    file.parent.mkdir(parents=True, exist_ok=True)
+    """Write a file whole."""
     with whole_file(file) as temporary:
         temporary.write_bytes(content)
 

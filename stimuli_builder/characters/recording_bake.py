@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image as PillowImage
 
 from experiments.errors import InputError, counted
-from experiments.files import whole_text
+from experiments.files import check_folder, whole_text
 from stimuli_builder.characters.recording import (
     LOOKS_AWAY,
     SHEAR,
@@ -116,8 +116,7 @@ def bake_recording(order: RecordingOrder) -> RecordingBake:
     if (order.out / "character.toml").exists():
         raise InputError(f"{order.out}: there is a character already; choose another folder or remove it")
     info = open_video(order.video, order.accept_variable_rate)
-    if not order.out.parent.is_dir():
-        raise InputError(f"{order.out}: the folder {order.out.parent} does not exist; create it first")
+    check_folder(order.out)
     model, path = _tracked(order, info)
     track = read_eye_track(path, info, order.one_eye)
     openings, refused = find_openings(track, info)
@@ -151,7 +150,7 @@ def _tracked(order: RecordingOrder, info: VideoInfo) -> tuple[CoupledModel | Non
         seen = survey(info, one_eye=order.one_eye, advance=lambda now: progress.update(task, completed=now))
     with step_progress("training", training_steps()) as advance:
         lesson = label_free_lesson(info, seen, TrainingOptions(), one_eye=order.one_eye, advance=advance)
-    order.out.mkdir(exist_ok=True)
+    order.out.mkdir(parents=True, exist_ok=True)
     path = order.out / TRACK_NAME
     with frame_progress() as progress:
         task = progress.add_task("tracking", total=info.frame_count)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from experiments.errors import InputError, counted
-from experiments.files import check_ending, check_targets, temporary_beside
+from experiments.files import check_ending, check_folder, check_target, check_targets
 from stimuli_builder.blinks.plots import check_figure_name
 from stimuli_builder.progress import frame_progress, step_progress
 from stimuli_builder.tracking.labelfree import label_free_lesson, worst_frames, write_relabel
@@ -140,11 +140,8 @@ def track_folder(job: TrackJob) -> None:
         raise InputError(
             f"{job.video}: there is no video in this folder ({' '.join(sorted(VIDEO_SUFFIXES))})"
         )
-    if job.out.exists() and not job.out.is_dir():
-        raise InputError(f"{job.out}: expected a folder for the tracks of {job.video}, but this is a file")
-    if not job.out.parent.is_dir():
-        raise InputError(f"{job.out}: the folder {job.out.parent} does not exist; create it first")
-    job.out.mkdir(exist_ok=True)
+    check_folder(job.out)
+    job.out.mkdir(parents=True, exist_ok=True)
     namesakes = Counter(video.stem for video in videos)
     refused = 0
     for number, video in enumerate(videos, start=1):
@@ -180,7 +177,7 @@ def _check(job: TrackJob) -> None:
     if job.relabel is not None and (job.labels is not None or job.model is not None):
         raise InputError("--relabel is for tracking without --labels and --model; remove them")
     if job.relabel is not None:
-        temporary_beside(job.relabel)
+        check_target(job.relabel)
     check_targets([job.out, job.preview, job.plot], [job.video, job.labels, job.model, job.relabel])
     check_ending(job.out, (".csv",), "a track")
     if job.relabel is not None:

@@ -272,12 +272,18 @@ def test_a_database_without_tables_gets_none(
     assert refused.stderr.startswith("error: there is an empty database at ")
 
 
-def test_an_export_makes_no_folders(settings: Settings, study, tmp_path: Path) -> None:
-    out = tmp_path / "mistyped" / "x.csv"
-    refused = run_server_command(settings, "export", "short", "--out", str(out))
+def test_an_export_creates_the_folder_of_its_file(settings: Settings, study, tmp_path: Path) -> None:
+    for command in (["export", "short"], ["audit", "export"]):
+        out = tmp_path / command[0] / "new" / "x.csv"
+        done = run_server_command(settings, *command, "--out", str(out))
+        assert (done.returncode, done.stderr) == (0, "")
+        assert out.is_file()
+
+
+def test_a_refused_export_creates_no_folder(settings: Settings, study, tmp_path: Path) -> None:
+    refused = run_server_command(settings, "export", "none", "--out", str(tmp_path / "new" / "x.csv"))
     assert refused.returncode == 2
-    assert "does not exist; create it first" in refused.stderr
-    assert not out.parent.exists()
+    assert not (tmp_path / "new").exists()
 
 
 def test_personal_links_come_as_a_table(settings: Settings, study) -> None:

@@ -160,14 +160,12 @@ class TestRefusals:
         assert not (tmp_path / "new" / "secret_key").exists()
         target.database.close()
 
-    @pytest.mark.parametrize(
-        ("path", "keys"), [("no/b.tar", None), ("b.tar", "no/keys.json"), ("file/b.tar", None)]
-    )
-    def test_a_folder_that_is_not_there(
+    @pytest.mark.parametrize(("path", "keys"), [("file/b.tar", None), ("b.tar", "file/keys.json")])
+    def test_a_file_where_the_folder_should_be(
         self, services: Services, empty_database_url: str, path: str, keys: str | None, tmp_path: Path
     ) -> None:
         (tmp_path / "file").write_text("")
-        with pytest.raises(InputError, match=r"the folder .*(no|file) does not exist; create it first$"):
+        with pytest.raises(InputError, match=r"file: expected a folder, but .*file is a file$"):
             back_up(
                 services.database,
                 services.settings,
@@ -175,8 +173,15 @@ class TestRefusals:
                 tmp_path / path,
                 keys=tmp_path / keys if keys else None,
             )
-        assert not (tmp_path / "no").exists()
         assert not (tmp_path / "b.tar").exists(), "no backup without its keys"
+
+    def test_folders_that_are_missing_are_created(
+        self, services: Services, empty_database_url: str, tmp_path: Path
+    ) -> None:
+        target, keys = tmp_path / "new" / "b.tar", tmp_path / "safe" / "keys.json"
+        back_up(services.database, services.settings, services.clips, target, keys=keys)
+        assert target.is_file()
+        assert keys.is_file()
 
     @pytest.mark.parametrize(
         ("path", "keys"), [("b.tar", "b.tar"), ("erasures.ndjson", None), ("b.tar", "erasures.ndjson")]
