@@ -46,6 +46,10 @@ class MethodChoice(StrEnum):
     ELO = "elo"
 
 
+SAMPLES_MIN = 100
+"""Fewer samples do not hold 2.5% tails."""
+
+
 class IntervalsChoice(StrEnum):
     """How 95% intervals of abilities are found."""
 
@@ -147,7 +151,10 @@ def pairs(
         typer.Option(help="For jod: item whose score is fixed, ITEM or ITEM=10. Default: a mean of 0."),
     ] = None,
     bootstrap: Annotated[
-        int, typer.Option(help="Samples for jod, elo and --intervals bootstrap; 0 for no intervals.", min=0)
+        int,
+        typer.Option(
+            help="Samples for jod, elo and --intervals bootstrap: 100 or more, or 0 for no intervals.", min=0
+        ),
     ] = 500,
     screen: Annotated[
         bool,
@@ -179,6 +186,8 @@ def pairs(
     from analysis.pairs.abilities import read_item_factors
     from analysis.pairs.comparisons import read_comparisons
 
+    if 0 < bootstrap < SAMPLES_MIN:
+        raise InputError(f"--bootstrap takes 0 or at least {SAMPLES_MIN} samples, got {bootstrap}")
     with progress_spinner("reading comparisons"):
         # The items are levels of `left`; any other ordered column is a factor of the items.
         orders = levels or []

@@ -145,9 +145,10 @@ def groupings(rows: pd.DataFrame, terms: ModelTerms) -> tuple[Grouping, ...]:
 
 
 def _grouping(rows: pd.DataFrame, columns: list[str], name: str, what: str) -> Grouping:
+    # Joined by a character that no cell has: 'a/b' with 'c' is another level than 'a' with 'b/c'.
     label = rows[columns[0]].astype(str)
     for extra in columns[1:]:
-        label = label + "/" + rows[extra].astype(str)
+        label = label + "\x1f" + rows[extra].astype(str)
     codes, names = pd.factorize(label, sort=True)
     if len(names) < 2:
         raise InputError(f"expected at least two {what}, got {len(names)}")
@@ -156,7 +157,8 @@ def _grouping(rows: pd.DataFrame, columns: list[str], name: str, what: str) -> G
             f"every row has a different value for {what}, which is confounded with the residual; name a "
             "column whose values repeat"
         )
-    return Grouping(name, tuple(str(text) for text in names), codes.astype(np.int64))
+    shown = tuple(str(text).replace("\x1f", "/") for text in names)
+    return Grouping(name, shown, codes.astype(np.int64))
 
 
 def _refuse_same(group: Grouping, before: list[Grouping]) -> None:

@@ -15,6 +15,10 @@ Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 OTHERS_MAX = 4000
 """Effects of contents and items whose matrix is inverted whole."""
+SD_MAX = 10.0
+"""Log odds beyond which raters never contradict themselves: the likelihood has no maximum."""
+GRADIENT_MAX = 0.1
+"""Of a log-likelihood at its maximum. The search stops at less, or where rounding hides a further rise."""
 
 
 @dataclass(frozen=True)
@@ -259,6 +263,11 @@ def fit_crossed(data: CrossedPairs, start: Fit) -> tuple[Fit, tuple[RandomEffect
         p = float(stats.chi2.sf(chi2, 1)) / 2 if chi2 > 0 else 1.0
         # The likelihood is even in an SD: a negative one is the same model.
         sd = abs(float(theta[len(start.parameters) + index]))
+        if sd > SD_MAX:
+            raise InputError(
+                f"the SD of '{name}' has no largest likelihood (it passed {SD_MAX:g} log odds): answers of each "
+                "hardly ever contradict one another; remove --crossed, or collect more comparisons of each pair"
+            )
         effects.append(RandomEffect(name, data.levels[index], sd, chi2, p))
     covariance = _covariance(data, theta)[: len(start.parameters), : len(start.parameters)]
     return Fit(theta[: len(start.parameters)], covariance, value, start.shares), tuple(effects)
@@ -278,6 +287,11 @@ def _maximum(data: CrossedPairs, theta: Array, fixed: tuple[int, ...]) -> tuple[
     gtol = 1e-5 * len(data.x) ** 0.5
     optimum = optimize.minimize(loss, theta[free], jac=True, method="BFGS", options={"gtol": gtol})
     whole[free] = optimum.x
+    if not optimum.success and np.abs(optimum.jac).max() > GRADIENT_MAX:
+        raise InputError(
+            "the crossed effects did not converge; an item may win nearly always, or answers may be too few: "
+            "remove --by or --crossed"
+        )
     return whole, -float(optimum.fun)
 
 

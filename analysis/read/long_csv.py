@@ -91,8 +91,7 @@ def read_long_table(
         raise InputError(f"{path.name}: no participant has a rating and all covariates")
     keep = answers_that_count(table, keep, "ratings")
     rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)
-    synthetic = "synthetic" in rows.columns and bool((rows["synthetic"] == "1").any())
-    return LongData(rows, path.name, tuple(table.decisions), synthetic, table.header)
+    return LongData(rows, path.name, tuple(table.decisions), table.synthetic, table.header)
 
 
 def _with_covariate(

@@ -91,13 +91,12 @@ def read_model_input(
             keep = keep & ~without
     if not keep.any():
         raise InputError(f"{path.name}: no row has a usable rating")
-    synthetic = "synthetic" in rows.columns and bool(rows["synthetic"].astype(str).isin(("1", "True")).any())
     return ModelInput(
         rows[keep].reset_index(drop=True),
         tuple(within),
         tuple(item),
         tuple(decisions),
-        synthetic,
+        table.synthetic,
         table.header,
     )
 
@@ -118,7 +117,7 @@ def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequ
     if not item:
         return
     pairs = table.columns[[participant, *item]].drop_duplicates()
-    what = pairs[list(item)].astype(str).agg("/".join, axis=1)
+    what = pairs[list(item)].astype(str).agg("\x1f".join, axis=1)
     people = pairs[participant].astype(str)
     if len(pairs) > 1 and len(pairs) == people.nunique() == what.nunique():
         raise InputError(

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.models.columns import ModelTerms, groupings
 from analysis.models.mixed import fit_mixed
 from analysis.models.ordinal import fit_ordinal
 from analysis.models.random_part import MixedResult
@@ -104,3 +105,17 @@ def test_the_ordinal_model_takes_groups_and_covariates() -> None:
     assert [e.effect for e in fit.effects] == ["group", "blur", "group:blur", "age"]
     assert fit.coefficients[-1].name == "age"
     assert "group * blur + age" in fit.formula
+
+
+def test_items_named_by_two_columns_are_told_apart_whatever_the_names_hold() -> None:
+    rows = pd.DataFrame(
+        {
+            "who": [str(k // 4) for k in range(12)],
+            "profile": ["a", "a/b", "a", "a/b"] * 3,
+            "exemplar": ["b/c", "c", "c", "b/c"] * 3,
+        }
+    )
+    terms = ModelTerms(participant="who", rating="", within=(), item=("profile", "exemplar"))
+    items = groupings(rows, terms)[1]
+    assert (len(items.names), len(set(items.codes))) == (4, 4)
+    assert sorted(items.names) == ["a/b/b/c", "a/b/c", "a/b/c", "a/c"]

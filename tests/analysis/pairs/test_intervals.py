@@ -292,6 +292,18 @@ def test_crossed_effects_are_the_maximum_of_the_laplace_likelihood(contents: int
     assert [item.se for item in result.items[1:]] == pytest.approx(errors[:3], rel=1e-3)
 
 
+def test_raters_who_never_contradict_themselves_have_no_largest_spread() -> None:
+    random = np.random.default_rng(2)
+    order = np.array([random.permutation(3) for _ in range(12)])
+    left, right = np.tile(np.array([*combinations(range(3), 2)]), (72, 1)).T
+    rater = np.repeat(np.arange(12), 18)
+    outcome = np.where(order[rater, left] < order[rater, right], LEFT, RIGHT)
+    names = tuple(f"r{k}" for k in range(12))
+    own = Comparisons(tuple("abc"), left, right, outcome, rater, names, "made", True, ())
+    with pytest.raises(InputError, match="the SD of 'rater' has no largest likelihood"):
+        fit_abilities(own, crossed=True)
+
+
 def test_crossed_gradient_is_that_of_the_likelihood() -> None:
     own = simulated(n=300, spread=0.7, contents=4)
     model = Model("rao-kupper", free_abilities(4), order_effect=True)
@@ -334,6 +346,7 @@ def test_items_vary_beyond_their_factors() -> None:
         ),
         (("--firth", "--intervals", "profile"), "--intervals profile takes no --firth"),
         (("--intervals", "bootstrap", "--bootstrap", "0"), "needs --bootstrap above 0"),
+        (("--method", "elo", "--bootstrap", "1"), "--bootstrap takes 0 or at least 100 samples, got 1"),
         (("--method", "elo", "--firth"), "--method elo takes no"),
         (("--method", "rao-kupper"), "no comparison is a tie"),
         (("--intervals", "bootstrap", "--participant", "id"), "in most samples of the 3 raters"),

@@ -150,7 +150,7 @@ def test_commands_scale_contents(tmp_path: Path) -> None:
     alone = _file(tmp_path / "x.csv", *(row for row in _rows() if ",x," in row))
     expected = fit_abilities(_read(alone), "bradley-terry")
     assert known["contents"]["x"]["items"][1]["ability"] == pytest.approx(expected.items[1].ability)
-    jod = [*named, "--method", "jod", "--bootstrap", "20", "--screen", "--reference", "a=10"]
+    jod = [*named, "--method", "jod", "--bootstrap", "100", "--screen", "--reference", "a=10"]
     ended = runner.invoke(app, ["pairs", str(file), *jod])
     assert ended.exit_code == 0, ended.output
     assert json.loads(out.read_text(encoding="utf-8"))["scales"][1]["items"][0]["jod"] == 10.0
