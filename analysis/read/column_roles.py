@@ -82,7 +82,9 @@ class TableGuess:
 
     def command_line(self, file: str) -> str:
         """The whole command for a shell."""
-        roles = {column.name: column.role for column in self.columns if column.role}
+        # A guess may suit another analysis than this one.
+        taken = [role for roles in OPTIONS[self.command] for role in roles]
+        roles = {column.name: column.role for column in self.columns if column.role in taken}
         return shlex.join(["analysis", self.command, file, *options_of(self.command, roles)])
 
 
@@ -116,11 +118,18 @@ def options_of(command: str, roles: Mapping[str, str]) -> list[str]:
     Raises
     ------
     InputError
-        The command is unknown, a role that it needs has no column, or a role of one column has several.
+        The command is unknown or does not take a role; a role that it needs has no column, or a role of one
+        column has several.
     """
     if command not in OPTIONS:
         raise InputError(f"expected an analysis ({', '.join(OPTIONS)}), got '{command}'")
     needed, optional = OPTIONS[command]
+    for name, role in roles.items():
+        if role not in (*needed, *optional):
+            raise InputError(
+                f"analysis {command} takes no column for '{role}', got '{name}'; remove its role, or choose "
+                "another analysis"
+            )
     options = []
     for role in (*needed, *optional):
         names = [name for name, own in roles.items() if own == role]

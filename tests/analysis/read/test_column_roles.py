@@ -88,6 +88,11 @@ def test_values_are_described(tmp_path: Path) -> None:
         ("anova", {"p": "participant", "r": "rating", "a,b": "within"}, "has a comma in its name"),
         ("pairs", {"l": "left", "w": "winner"}, "needs a column for right"),
         ("run", {}, "expected an analysis"),
+        (
+            "t-test",
+            {"p": "participant", "r": "rating", "a": "within"},
+            "t-test takes no column for 'within', got 'a'",
+        ),
     ],
 )
 def test_roles_that_are_no_analysis_are_refused(command: str, chosen: dict[str, str], said: str) -> None:

@@ -55,6 +55,19 @@ def test_a_table_becomes_a_result(dashboard: Dashboard, tmp_path: Path) -> None:
     expect(page.get_by_text("ratings", exact=False).filter(has_text="χ²").first).to_be_visible(timeout=60_000)
 
 
+def test_a_refusal_names_the_roles_of_the_page(dashboard: Dashboard, tmp_path: Path) -> None:
+    _table(tmp_path / "warmth.csv")
+    page = dashboard.open("/analyze")
+    page.locator('input[type="file"]').set_input_files(tmp_path / "warmth.csv")
+    page.get_by_label("Role of warmth").select_option(label="Rating")
+    page.get_by_label("Role of seat").select_option(label="Factor within participants")
+    page.get_by_role("button", name="Analyze", exact=True).click()
+    alert = page.get_by_role("alert")
+    expect(alert).to_contain_text("use “Factor between participants”")
+    expect(alert).not_to_contain_text("--")
+    dashboard.complaints.clear()  # Chromium reports the refusal as a failed request
+
+
 def test_a_file_that_is_no_table_is_one_line(dashboard: Dashboard, tmp_path: Path) -> None:
     page = dashboard.open("/analyze")
     (tmp_path / "empty.csv").write_text("a,b\n", encoding="utf-8")

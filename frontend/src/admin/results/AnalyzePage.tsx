@@ -57,11 +57,22 @@ async function readFile(file: File): Promise<Chosen> {
   return { name: file.name, content: btoa(text) };
 }
 
+/** A refusal speaks of the command's options, which this page shows as roles. */
+function withRoleNames(error: Error): Error {
+  const said = error.message.replaceAll(/--([a-z]+)\b/gu, (option, role: string) => (role in ROLES ? `“${ROLES[role]}”` : option));
+  return new Error(said.includes("--") ? `${said}. Options with -- belong to the command analysis` : said);
+}
+
 export function AnalyzePage() {
   const [command, setCommand] = useState("");
   const [roles, setRoles] = useState<Record<string, string>>({});
   const analysis = useMutation({
-    mutationFn: ({ name, content }: Chosen) => unwrap(api.POST("/api/admin/analyses", { body: { name, content, command, roles } })),
+    mutationFn: ({ name, content, columns }: Chosen & { columns: Columns }) => {
+      const { needed = [], optional = [] } = columns.commands[command] ?? {};
+      // Roles of another analysis stay in mind for when it is chosen again.
+      const taken = Object.fromEntries(Object.entries(roles).filter(([, role]) => [...needed, ...optional].includes(role)));
+      return unwrap(api.POST("/api/admin/analyses", { body: { name, content, command, roles: taken } }));
+    },
   });
   const table = useMutation({
     mutationFn: async (file: File) => {
@@ -117,7 +128,7 @@ export function AnalyzePage() {
             </Button>
             {analysis.isPending && <Text role="status">This takes seconds, a mixed model up to a minute.</Text>}
           </Group>
-          {analysis.error !== null && <ErrorAlert error={analysis.error} />}
+          {analysis.error !== null && <ErrorAlert error={withRoleNames(analysis.error)} />}
           {analysis.data !== undefined && <ResultOf result={analysis.data} />}
         </>
       )}
