@@ -246,7 +246,9 @@ def add_version(
         manifest=manifest.model_dump(mode="json"),
         inter_ocular_px=manifest.inter_ocular_px,
         format=FORMAT,
-        series=series_for(study, experiment, manifest),
+        series=series_for(
+            study, experiment, {(clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips}
+        ),
         note=note,
         created_by=identity.account_id if identity else None,
     )
@@ -402,7 +404,9 @@ def add_definition(
     with database.write() as session:
         study = for_edit(session, name, order.revision, identity, "edit")
         manifest = Manifest.model_validate(active_version(session, study).manifest)
-        if added is not None:
+        if order.places is not None:
+            manifest = own_clips.placed_manifest(manifest, added, order.places, experiment)
+        elif added is not None:
             own_clips.check_declared(added, experiment)
             manifest = own_clips.merged_manifest(manifest, added)
         manifest = own_clips.only_declared(manifest, experiment)
@@ -420,6 +424,13 @@ def _added_clips(
     if (folder / MANIFEST_NAME).is_file():
         manifest = read_manifest(folder)
     else:
-        manifest = own_clips.manifest_of(experiment, _placed_levels(order.levels, folder), folder)
+        placed = (
+            _placed_levels(order.levels, folder)
+            if order.places is None
+            else own_clips.places_in(folder, order.places)
+        )
+        if not placed:
+            return None
+        manifest = own_clips.manifest_of(experiment, placed, folder)
     _store(clips, manifest, folder)
     return manifest

@@ -41,6 +41,7 @@ from server.studies.schemas import (
     DefinitionText,
     EditDefinition,
     EditedDefinition,
+    EditedVersion,
     JudgedEdit,
     Label,
     LaunchCheck,
@@ -115,10 +116,10 @@ def add_version(services: ServicesDep, identity: Writer, study: str, body: NewVe
 
 
 @router.post("/studies/{study}/versions/check")
-def judge_version(database: DatabaseDep, identity: Viewer, study: str, body: DefinitionText) -> JudgedEdit:
+def judge_version(database: DatabaseDep, identity: Viewer, study: str, body: EditedVersion) -> JudgedEdit:
     """Say, before a changed definition is saved, what changes and whether a new data series would begin."""
     with database.read() as session:
-        return service.judge_edit(session, study, body.toml, identity)
+        return service.judge_edit(session, study, body, identity)
 
 
 @router.get("/studies/{study}/versions/{number}", response_class=PlainTextResponse)

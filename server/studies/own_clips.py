@@ -16,7 +16,7 @@ from experiments.own_clips import Placed, check_factorial, levels_of
 from experiments.schema.canonical import definition_sha256
 from server.core.errors import Conflict
 from server.core.storage import ClipStore
-from server.studies.schemas import OwnClips
+from server.studies.schemas import OwnClips, PlacedClip
 from server.transcoding.records import records_of
 from video_conversion.prepared import Prepared, clip_name
 
@@ -228,6 +228,44 @@ def only_declared(manifest: Manifest, experiment: Experiment) -> Manifest:
     declared = {(spec.cell, spec.exemplar) for spec in design.clips(experiment)}
     kept = tuple(clip for clip in manifest.clips if (clip.cell, clip.exemplar) in declared)
     return manifest.model_copy(update={"clips": kept}) if kept else manifest
+
+
+def places_in(folder: Path, places: Sequence[PlacedClip]) -> Placed:
+    """The cells of an upload's clips, of those of a whole study."""
+    hashes = {name: record.sha256 for name, record in records_of(folder).items()}
+    return {
+        clip.file: (clip.levels, clip.exemplar)
+        for clip in places
+        if hashes.get(clip.file) == clip.clip_sha256
+    }
+
+
+def placed_manifest(
+    known: Manifest, added: Manifest | None, places: Sequence[PlacedClip], experiment: Experiment
+) -> Manifest:
+    """`known` with the clips that `places` lists, in their cells; InputError for a clip of neither."""
+    if any(clip.profile or clip.inputs for clip in known.clips):
+        raise InputError(
+            "the clips of this study were rendered for their cells; only uploaded clips can move"
+        )
+    of_either = (*known.clips, *(added.clips if added is not None else ()))
+    clips = {(clip.sha256, clip.file): clip for clip in of_either}
+    moved = []
+    for clip in places:
+        source = clips.get((clip.clip_sha256, clip_name(clip.file)))
+        if source is None:
+            raise InputError(f"'{clip.file}' is neither a clip of this study nor of the upload")
+        if set(clip.levels) != set(experiment.factor_names):
+            raise InputError(
+                f"'{clip.file}': expected a level of each of {', '.join(experiment.factor_names)}, "
+                f"got {', '.join(clip.levels) or 'none'}"
+            )
+        levels = {factor: clip.levels[factor] for factor in experiment.factor_names}
+        where = {"levels": levels, "cell": "/".join(levels.values()), "exemplar": clip.exemplar}
+        moved.append(source.model_copy(update=where))
+    if not moved:
+        raise InputError("expected at least one clip in a cell, got none")
+    return known.model_copy(update={"clips": tuple(moved)})
 
 
 def manifest_of(experiment: Experiment, placed: Placed, folder: Path) -> Manifest:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints
 
 from experiments.declaration.experiment import Experiment
-from experiments.manifest import FrameRate, SourceVideo
+from experiments.manifest import FrameRate, Sha256, SourceVideo
 from server.core.values import Number, RequestBody
 from server.models import Right
 from server.participation.recruiter import Recruiter, without_refused
@@ -252,14 +252,36 @@ class NewStudy(RequestBody):
     )
 
 
-class NewVersion(RequestBody):
+class PlacedClip(RequestBody):
+    """A clip of the study or of an upload, and the cell it belongs to."""
+
+    clip_sha256: Sha256
+    file: Annotated[str, StringConstraints(max_length=300)]
+    levels: dict[str, str]
+    exemplar: Annotated[int, Field(ge=1, le=10_000)]
+
+
+Places = Annotated[
+    list[PlacedClip] | None,
+    Field(max_length=5000, description="Every clip with its cell; null leaves clips where they are."),
+]
+
+
+class EditedVersion(DefinitionText):
+    """A changed definition, and clips in other cells, to be judged before they are saved."""
+
+    places: Places = None
+
+
+class NewVersion(EditedVersion):
     """A changed definition; it becomes a new version."""
 
     revision: Revision
-    toml: TomlText
     note: Label = ""
     upload: str | None = Field(default=None, description="Clips to add, or to put in the place of others.")
-    levels: LevelsTable | LevelsPattern | None = None
+    levels: LevelsTable | LevelsPattern | None = Field(
+        default=None, description="Cells of the uploaded clips; not needed with `places`."
+    )
 
 
 class ChangeStatus(RequestBody):

@@ -26,6 +26,7 @@ from server.studies.schemas import (
     JudgedEdit,
     KeyDifference,
     Piece,
+    PlacedClip,
     SeriesOut,
 )
 
@@ -69,13 +70,16 @@ def definition_of_series(session: Session, study: Study, series: int | None) -> 
     return definition_of(version_of_series(session, study, series))
 
 
-def series_for(study: Study, experiment: Experiment, manifest: Manifest) -> int:
+Content = set[tuple[str, int, str]]
+"""Cell, exemplar and hash of each clip."""
+
+
+def series_for(study: Study, experiment: Experiment, clips: Content) -> int:
     """The series of a further version: the latest whose versions all measure the same by the same clips.
 
     Where there is none, a new series begins. One version is not enough: a form may be new to an older version
     and another form than that of a newer one.
     """
-    clips = {(clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips}
     by_series: dict[int, list[StudyVersion]] = {}
     for version in study.versions:
         by_series.setdefault(version.series, []).append(version)
@@ -85,28 +89,39 @@ def series_for(study: Study, experiment: Experiment, manifest: Manifest) -> int:
     return max(by_series, default=0) + 1
 
 
-def _measures_the_same(
-    version: StudyVersion, experiment: Experiment, clips: set[tuple[str, int, str]]
-) -> bool:
+def _measures_the_same(version: StudyVersion, experiment: Experiment, clips: Content) -> bool:
     known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips if clip.cell}
     return known == clips and not changes_what_is_measured(difference(definition_of(version), experiment))
 
 
-def effects_of_edit(session: Session, study: Study, experiment: Experiment) -> JudgedEdit:
+def effects_of_edit(
+    session: Session, study: Study, experiment: Experiment, places: list[PlacedClip] | None = None
+) -> JudgedEdit:
     """What saving this definition as a further version would do to the answers that are stored."""
     present = active_version(session, study)
-    series = series_for(study, experiment, Manifest.model_validate(present.manifest))
+    known = Manifest.model_validate(present.manifest).clips
+    clips = before = {(clip.cell, clip.exemplar, clip.sha256) for clip in known}
+    if places is not None:
+        order = experiment.factor_names
+        clips = {
+            ("/".join(clip.levels.get(name, "") for name in order), clip.exemplar, clip.clip_sha256)
+            for clip in places
+        }
+    series = series_for(study, experiment, clips)
     runs = repository.run_count_of_series(session, study, present.series)
-    known = {version.series for version in study.versions}
+    changes = [
+        ChangeOut(path=change.path, effect=change.effect, text=str(change))
+        for change in difference(definition_of(present), experiment)
+    ]
+    if moved := len(clips - before):
+        words = "1 cell gets another clip" if moved == 1 else f"{moved} places in cells get other clips"
+        changes.append(ChangeOut(path="clips", effect="measured", text=words))
     return JudgedEdit(
-        changes=[
-            ChangeOut(path=change.path, effect=change.effect, text=str(change))
-            for change in difference(definition_of(present), experiment)
-        ],
+        changes=changes,
         series=series,
         present_series=present.series,
         runs=runs,
-        begins_series=bool(runs) and series not in known,
+        begins_series=bool(runs) and series not in {version.series for version in study.versions},
     )
 
 

@@ -53,6 +53,7 @@ from server.studies.schemas import (
     DesignOut,
     EditDefinition,
     EditedDefinition,
+    EditedVersion,
     FactorOut,
     JudgedEdit,
     LaunchCheck,
@@ -123,9 +124,10 @@ def edit_definition(edited: EditDefinition) -> EditedDefinition:
     return EditedDefinition(toml=text, data=data, problems=checked.problems, design=checked.design)
 
 
-def judge_edit(session: Session, name: str, text: str, identity: Identity) -> JudgedEdit:
-    """What saving this definition would do to stored answers; DefinitionError where it cannot be used."""
-    return effects_of_edit(session, find_study(session, name, identity, "view"), planned_experiment(text))
+def judge_edit(session: Session, name: str, edit: EditedVersion, identity: Identity) -> JudgedEdit:
+    """What saving this edit would do to stored answers; DefinitionError where it cannot be used."""
+    study = find_study(session, name, identity, "view")
+    return effects_of_edit(session, study, planned_experiment(edit.toml), edit.places)
 
 
 # What an experimenter does with studies.

@@ -1290,6 +1290,10 @@ export interface components {
    problems: components["schemas"]["ProblemOut"][];
    design: components["schemas"]["DesignOut"] | null;
   };
+  EditedVersion: {
+   toml: string;
+   places?: components["schemas"]["PlacedClip"][] | null;
+  };
   Elsewhere: {
    url: string;
   };
@@ -2130,8 +2134,9 @@ export interface components {
    token: string;
   };
   NewVersion: {
-   revision: number;
    toml: string;
+   places?: components["schemas"]["PlacedClip"][] | null;
+   revision: number;
    /** @default  */
    note?: string;
    upload?: string | null;
@@ -2325,6 +2330,14 @@ export interface components {
    /** @enum {string} */
    kind: "same" | "gone" | "new";
    text: string;
+  };
+  PlacedClip: {
+   clip_sha256: string;
+   file: string;
+   levels: {
+    [key: string]: string;
+   };
+   exemplar: number;
   };
   Playback: {
    verdicts: {
@@ -3955,6 +3968,7 @@ export type DropFailedPlays = components['schemas']['DropFailedPlays'];
 export type DropSlowTrials = components['schemas']['DropSlowTrials'];
 export type EditDefinition = components['schemas']['EditDefinition'];
 export type EditedDefinition = components['schemas']['EditedDefinition'];
+export type EditedVersion = components['schemas']['EditedVersion'];
 export type Elsewhere = components['schemas']['Elsewhere'];
 export type Erase = components['schemas']['Erase'];
 export type Erased = components['schemas']['Erased'];
@@ -4054,6 +4068,7 @@ export type PairResults = components['schemas']['PairResults'];
 export type PairedComparison = components['schemas']['PairedComparison'];
 export type Period = components['schemas']['Period'];
 export type Piece = components['schemas']['Piece'];
+export type PlacedClip = components['schemas']['PlacedClip'];
 export type Playback = components['schemas']['Playback'];
 export type PlaybackLog = components['schemas']['PlaybackLog'];
 export type PlaybackRules = components['schemas']['PlaybackRules'];
@@ -6735,7 +6750,7 @@ export interface operations {
   };
   requestBody: {
    content: {
-    "application/json": components["schemas"]["DefinitionText"];
+    "application/json": components["schemas"]["EditedVersion"];
    };
   };
   responses: {

@@ -1,4 +1,15 @@
 import { describe, expect, it } from "vitest";
+import type { Data } from "../../src/admin/builder/data";
+import {
+  arrangementOf,
+  factorsOf,
+  filledByPattern,
+  type Place,
+  placesToSave,
+  slotsOf,
+  withMoved,
+  withRenames,
+} from "../../src/admin/builder/places";
 import { clipFindings, factsOf, pictureProblems, repeatedFiles } from "../../src/admin/clips/examine";
 import { sizeRemark } from "../../src/admin/clips/UploadClips";
 import { languageFindings, summaryOf } from "../../src/admin/studies/Preflight";
@@ -179,5 +190,50 @@ describe("the next step of a study", () => {
     expect(nextStep({ ...study, status: "live", paused: true }, []).page).toBe("/settings");
     expect(nextStep({ ...study, status: "closed" }, []).page).toBe("/data");
     expect(nextStep({ ...study, archived_at: "2026-01-01" }, []).page).toBe("/settings");
+  });
+});
+
+describe("clips in the cells of a study", () => {
+  const level = (name: string) => ({ name, label: name });
+  const data = { factors: [{ name: "speed", levels: [level("slow"), level("fast")] }], exemplars: { per_cell: 1 } };
+  const clip = (file: string, speed: string, exemplar = 1): Place => {
+    return { clip_sha256: file, file, levels: { speed }, exemplar, upload: null };
+  };
+  const [slow, fast] = [clip("a.mp4", "slow"), clip("b.mp4", "fast")];
+  const files = (places: readonly Place[], of: Data = data) => arrangementOf(places, of).filled.map((one) => one.clip?.file ?? null);
+
+  it("change places, and are out of a cell that they are taken from", () => {
+    const [first, second] = slotsOf(data);
+    expect(files(withMoved([slow, fast], data, slow, second ?? null))).toEqual(["b.mp4", "a.mp4"]);
+    const out = withMoved([slow, fast], data, slow, null);
+    expect(files(out)).toEqual([null, "b.mp4"]);
+    expect(files(withMoved(out, data, fast, first ?? null))).toEqual(["b.mp4", null]);
+    expect(placesToSave(out, data)).toEqual([{ clip_sha256: "b.mp4", file: "b.mp4", levels: { speed: "fast" }, exemplar: 1 }]);
+  });
+
+  it("follow a level and a factor to another name, and no level that came", () => {
+    const renamed = { factors: [{ name: "tempo", levels: [level("calm"), level("fast")] }], exemplars: { per_cell: 1 } };
+    expect(files(withRenames([slow, fast], data, renamed), renamed)).toEqual(["a.mp4", "b.mp4"]);
+    const more = { ...data, factors: [{ name: "speed", levels: [level("new"), level("slow"), level("fast")] }] };
+    const places = [slow, fast];
+    expect(withRenames(places, data, more)).toBe(places);
+    expect(files(places, more)).toEqual([null, "a.mp4", "b.mp4"]);
+    const other = { ...data, factors: [{ name: "speed", levels: [level("fast"), level("slow")] }] };
+    expect(withRenames(places, data, other)).toBe(places);
+  });
+
+  it("are filled from the names of files, with factors that are new", () => {
+    const names = ["rosie_fast_1.mp4", "rosie_fast_2.mp4", "rosie_slow_1.mp4", "rosie_slow_2.mp4", "odd.mp4"];
+    const filled = filledByPattern(
+      names.map((name) => clip(name, "slow", 0)),
+      data,
+      "{robot}_{speed}_{exemplar}.mp4",
+    );
+    expect(factorsOf(filled.data)).toEqual([
+      { name: "robot", levels: ["rosie"] },
+      { name: "speed", levels: ["slow", "fast"] },
+    ]);
+    expect(files(filled.places, filled.data)).toEqual(["rosie_slow_1.mp4", "rosie_slow_2.mp4", "rosie_fast_1.mp4", "rosie_fast_2.mp4"]);
+    expect(arrangementOf(filled.places, filled.data).rest.map(({ file }) => file)).toEqual(["odd.mp4"]);
   });
 });

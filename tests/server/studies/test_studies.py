@@ -152,6 +152,54 @@ def test_a_version_takes_further_clips_and_others_in_their_place(experimenter: A
     assert [series["versions"] for series in saved.json()["series"]] == [[1], [2]]
 
 
+def test_clips_change_cells_and_come_from_an_upload_into_cells(experimenter: Admin) -> None:
+    made = own_study(experimenter)
+    clips = {clip["file"]: clip for clip in experimenter.get("/studies/faces/clips").json()}
+
+    def place(file: str, speed: str, face: str, exemplar: int, sha256: str = "") -> dict[str, Any]:
+        levels = {"mood": face, "speed": speed}  # in another order than the factors are declared
+        sha256 = sha256 or clips[file]["clip_sha256"]
+        return {"clip_sha256": sha256, "file": file, "levels": levels, "exemplar": exemplar}
+
+    stay = [
+        place(clip["file"], clip["levels"]["speed"], clip["levels"]["mood"], clip["exemplar"])
+        for clip in clips.values()
+        if clip["cell"] != "fast/sad"
+    ]
+    swapped = [place("fast_sad_1.mp4", "fast", "sad", 2), place("fast_sad_2.mp4", "fast", "sad", 1)]
+    body = {"toml": made["toml"], "places": stay + swapped}
+    judged = experimenter.send("POST", "/studies/faces/versions/check", body).json()
+    assert [change["text"] for change in judged["changes"]] == ["2 places in cells get other clips"]
+    assert judged["series"] == 2
+    body["revision"] = made["summary"]["revision"]
+    saved = experimenter.send("POST", "/studies/faces/versions", body)
+    assert saved.status_code == 201, saved.text
+    after = {clip["file"]: clip["exemplar"] for clip in experimenter.get("/studies/faces/clips").json()}
+    assert (after["fast_sad_1.mp4"], after["fast_sad_2.mp4"]) == (2, 1)
+
+    body["revision"] += 1
+    empty = experimenter.send("POST", "/studies/faces/versions", body | {"places": stay + swapped[:1]})
+    assert "the first is fast/sad, exemplar 1" in empty.json()["error"]["message"]
+    foreign = place("fast_sad_2.mp4", "fast", "sad", 1, "0" * 64)
+    refused = experimenter.send("POST", "/studies/faces/versions", body | {"places": [*stay, foreign]})
+    assert "neither a clip of this study nor of the upload" in refused.json()["error"]["message"]
+
+    new = upload(
+        experimenter, ("any name.mp4", video_files("any name.mp4")["any name.mp4"] + b"\0\0\0\x08free")
+    )
+    found = new.json()
+    placed = place("any name.mp4", "fast", "sad", 1, found["files"][0]["sha256"])
+    body |= {"places": [*stay, swapped[0], placed], "upload": found["id"]}
+    saved = experimenter.send("POST", "/studies/faces/versions", body)
+    assert saved.status_code == 201, saved.text
+    files = {
+        clip["cell"]: clip["file"]
+        for clip in experimenter.get("/studies/faces/clips").json()
+        if clip["exemplar"] == 1
+    }
+    assert files["fast/sad"] == "any name.mp4"
+
+
 def test_a_level_that_is_taken_out_takes_its_clips_along(experimenter: Admin) -> None:
     made = own_study(experimenter)
     data = tomllib.loads(made["toml"])

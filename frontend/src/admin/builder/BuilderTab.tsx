@@ -23,38 +23,48 @@ const read = (body: Schemas["EditDefinition"]) => unwrap(api.POST("/api/admin/de
 interface Start {
   toml: string;
   data: unknown;
+  places: Kept["places"];
   /** How edits of two were brought together; null where there was one alone. */
   meeting: Meeting | null;
 }
 
-async function edit(body: Schemas["EditDefinition"]): Promise<Start> {
+async function edit({ places, ...body }: Schemas["EditDefinition"] & Pick<Kept, "places">): Promise<Start> {
   const { toml, data } = await read(body);
-  return { toml, data, meeting: null };
+  return { toml, data, places, meeting: null };
 }
 
 /** Kept work put into a version that somebody else saved meanwhile. Text that is not valid TOML stays as it is. */
-async function broughtTogether({ toml, data, base }: Kept, present: string): Promise<Start> {
+async function broughtTogether({ toml, data, base, places }: Kept, present: string): Promise<Start> {
   const [mine, before, theirs] = await Promise.all([
     read({ toml, data }),
     read({ toml: base ?? "", data: null }),
     read({ toml: present, data: null }),
   ]);
-  if (!isTable(mine.data) || !isTable(theirs.data)) return { toml: mine.toml, data: mine.data, meeting: null };
+  if (!isTable(mine.data) || !isTable(theirs.data)) return { toml: mine.toml, data: mine.data, places, meeting: null };
   const meeting = meetingOf(before.data, mine.data, theirs.data);
   const merged = await read({ toml: present, data: meeting.merged });
-  return { toml: merged.toml, data: merged.data, meeting };
+  return { toml: merged.toml, data: merged.data, places, meeting };
 }
+
+/** Whether kept work differs from what is stored. */
+const isWork = ({ toml, data, places }: Kept, detail: Schemas["StudyDetail"]) => data !== null || places !== null || toml !== detail.toml;
 
 /** Begins with work kept in this browser, where there is some, else with what is stored. */
 function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   const { name, revision } = detail.summary;
   const [kept] = useState(() => {
     const work = keptWork(name);
-    return work !== null && (work.data !== null || work.toml !== detail.toml) ? work : null;
+    return work !== null && isWork(work, detail) ? work : null;
   });
-  const [from, setFrom] = useState({ toml: kept?.toml ?? detail.toml, data: kept?.data ?? null });
-  const [others, setOthers] = useState(() => otherWork(name).filter(({ toml, data }) => data !== null || toml !== detail.toml));
-  const isMet = kept !== null && from.toml === kept.toml && kept.base !== null && kept.revision !== revision && kept.base !== detail.toml;
+  const [from, setFrom] = useState({ toml: kept?.toml ?? detail.toml, data: kept?.data ?? null, places: kept?.places ?? null });
+  const [others, setOthers] = useState(() => otherWork(name).filter((work) => isWork(work, detail)));
+  const isMet =
+    kept !== null &&
+    from.toml === kept.toml &&
+    from.places === kept.places &&
+    kept.base !== null &&
+    kept.revision !== revision &&
+    kept.base !== detail.toml;
   const start = useQuery({
     queryKey: ["builder start", from, isMet, revision],
     queryFn: () => (isMet ? broughtTogether(kept, detail.toml) : edit(from)),
@@ -65,7 +75,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   const open = (draft: Draft) => {
     if (keptWork(name) !== null && !window.confirm("Replace the unsaved work in this tab?")) return;
     without(draft);
-    setFrom({ toml: draft.toml, data: draft.data });
+    setFrom({ toml: draft.toml, data: draft.data, places: draft.places });
   };
   const discard = (draft: Draft) => {
     forgetDraft(draft.key);
@@ -73,7 +83,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   };
   const startOver = () => {
     forgetWork(name);
-    setFrom({ toml: detail.toml, data: null });
+    setFrom({ toml: detail.toml, data: null, places: null });
   };
   // What came of the kept work: put into what others saved, or still what saving would replace theirs by.
   const noteOf = (meeting: Meeting | null) => {
@@ -88,7 +98,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   return (
     <Answer of={start}>
       {(begun) => (
-        <Stack key={begun.toml} gap="sm">
+        <Stack key={`${begun.toml}${JSON.stringify(begun.places)}`} gap="sm">
           {noteOf(begun.meeting) !== null && (
             <Group gap="xs" role="status">
               <span>{noteOf(begun.meeting)}</span>
@@ -112,7 +122,11 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
               />
             </Group>
           ))}
-          <Workbench detail={detail} meeting={begun.meeting} start={{ toml: begun.toml, data: isTable(begun.data) ? begun.data : {} }} />
+          <Workbench
+            detail={detail}
+            meeting={begun.meeting}
+            start={{ toml: begun.toml, data: isTable(begun.data) ? begun.data : {}, places: begun.places }}
+          />
         </Stack>
       )}
     </Answer>

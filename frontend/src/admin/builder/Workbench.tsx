@@ -10,25 +10,35 @@ import { Link, useNavigate, useSearch } from "@tanstack/react-router";
 import { useState } from "react";
 import { DesignLine, TomlText } from "../studies/Design";
 import { TurnedAway } from "../studies/StatusBadge";
+import { onDemand } from "../ui/Answer";
 import { useChange } from "../ui/useChange";
 import { type Data, isTable, type Section } from "./data";
 import { Field } from "./fields/Field";
 import { Forms, Texts } from "./Forms";
 import { type Meeting, type MeetingEdit, placeName, withChange } from "./history";
+import { forgetUpload } from "../clips/useUpload";
 import { forgetWork } from "./kept";
+import { type Place, placesToSave } from "./places";
 import { EXPERIMENT, sectionOf, SECTIONS } from "./schema";
 import { TrialPreview } from "./TrialPreview";
 import { type Builder, BuilderContext, useBuilder, useBuilderHere } from "./useBuilder";
 
+const LevelGrid = onDemand(async () => (await import("./LevelGrid")).LevelGrid);
+
 // What saving an edited definition would do to the answers that are there: said before it is saved.
 
-function JudgedEdit({ detail, toml }: { detail: Schemas["StudyDetail"]; toml: string }) {
+function JudgedEdit({ detail, builder }: { detail: Schemas["StudyDetail"]; builder: Builder }) {
   const { name } = detail.summary;
-  const [settled] = useDebouncedValue(toml, 500);
+  const [settled] = useDebouncedValue(JSON.stringify(editOf(builder)), 500);
   const { data } = useQuery({
     queryKey: ["study", name, "judged", settled],
     queryFn: () =>
-      unwrap(api.POST("/api/admin/studies/{study}/versions/check", { params: { path: { study: name } }, body: { toml: settled } })),
+      unwrap(
+        api.POST("/api/admin/studies/{study}/versions/check", {
+          params: { path: { study: name } },
+          body: JSON.parse(settled) as Schemas["EditedVersion"],
+        }),
+      ),
     retry: false,
   });
   if (data === undefined || data.changes.length === 0) return null;
@@ -45,6 +55,11 @@ function JudgedEdit({ detail, toml }: { detail: Schemas["StudyDetail"]; toml: st
       </List>
     </Alert>
   );
+}
+
+/** What is saved, and judged before: the text, and the clips if some were moved. */
+function editOf({ toml, data, places, moved }: Builder): Schemas["EditedVersion"] {
+  return { toml, places: moved && places !== null ? placesToSave(places, data) : null };
 }
 
 function title(edit: Schemas["JudgedEdit"]): string {
@@ -85,7 +100,7 @@ function effect(edit: Schemas["JudgedEdit"], detail: Schemas["StudyDetail"]): st
 
 interface Props {
   detail: Schemas["StudyDetail"];
-  start: { toml: string; data: Data };
+  start: { toml: string; data: Data; places: readonly Place[] | null };
   meeting: Meeting | null;
 }
 
@@ -123,13 +138,13 @@ export function Workbench({ detail, start, meeting }: Props) {
           {builder.broken ? (
             <Alert color="yellow">This is not valid TOML. Correct the text or undo; the forms return then.</Alert>
           ) : (
-            <Page key={section.id} section={section} rendered={detail.rendered} />
+            <Page key={section.id} study={name} section={section} rendered={detail.rendered} />
           )}
         </Stack>
         {withToml && <TomlText toml={builder.toml} onChange={builder.setToml} problems={builder.problems} rows={40} />}
       </div>
       {wrong && <Wrong study={name} builder={builder} />}
-      {builder.changed && !builder.writing && !wrong && <JudgedEdit detail={detail} toml={builder.toml} />}
+      {builder.changed && !builder.writing && !wrong && <JudgedEdit detail={detail} builder={builder} />}
       {builder.design !== null && !wrong && <DesignLine design={builder.design} />}
     </BuilderContext>
   );
@@ -189,7 +204,7 @@ function shortly(value: unknown): string {
   return text.length > MAX_SHOWN ? `${text.slice(0, MAX_SHOWN)} …` : text;
 }
 
-function Page({ section, rendered }: { section: Section; rendered: boolean }) {
+function Page({ study, section, rendered }: { study: string; section: Section; rendered: boolean }) {
   const builder = useBuilderHere();
   // Clips that were uploaded have no rendering: its keys would say nothing.
   const keys = section.keys.filter((key) => key !== "render" || rendered || isTable(builder.data["render"]));
@@ -198,6 +213,7 @@ function Page({ section, rendered }: { section: Section; rendered: boolean }) {
   return (
     <Stack gap="sm">
       {section.id === "trial" && <TrialPreview />}
+      {section.id === "factors" && builder.places !== null && <LevelGrid study={study} />}
       {section.id === "screen" && <TurnedAway design={builder.design ?? undefined} />}
       {keys
         .map((key) => [key, EXPERIMENT.properties?.[key]] as const)
@@ -257,13 +273,24 @@ function Bar({ detail, builder, withToml, onWithToml }: BarProps) {
       unwrap(
         api.POST("/api/admin/studies/{study}/versions", {
           params: { path: { study: name } },
-          body: { revision, toml: builder.toml, note },
+          body: {
+            revision,
+            note,
+            ...editOf(builder),
+            upload: builder.places?.find((one) => one.upload !== null && one.exemplar > 0)?.upload ?? null,
+          },
         }),
       ),
     {
-      touches: [["study", name]],
+      touches: [
+        ["study", name],
+        ["clips", name],
+      ],
       done: "Saved as a new version.",
-      before: () => forgetWork(name),
+      before: () => {
+        forgetWork(name);
+        if (builder.moved) forgetUpload(`study ${name}`);
+      },
       // Somebody else saved meanwhile: their version is loaded, and the work kept here is put into it.
       refused: (error) => {
         if (!(error instanceof Refused) || error.status !== 409 || error.code !== "edited_meanwhile") return false;
@@ -275,8 +302,7 @@ function Bar({ detail, builder, withToml, onWithToml }: BarProps) {
   const [asked, setAsked] = useState<Schemas["JudgedEdit"] | null>(null);
   // Judged at the press, not while typing: what is saved is what was judged.
   const judge = useChange(
-    () =>
-      unwrap(api.POST("/api/admin/studies/{study}/versions/check", { params: { path: { study: name } }, body: { toml: builder.toml } })),
+    () => unwrap(api.POST("/api/admin/studies/{study}/versions/check", { params: { path: { study: name } }, body: editOf(builder) })),
     {
       touches: [],
       then: (edit) => {
@@ -285,7 +311,7 @@ function Bar({ detail, builder, withToml, onWithToml }: BarProps) {
       },
     },
   );
-  const ready = builder.changed && !builder.writing && !builder.broken && builder.problems.length === 0;
+  const ready = builder.changed && !builder.writing && !builder.broken && builder.problems.length === 0 && builder.empty.length === 0;
   return (
     <div className="builder-bar">
       <Group gap="xs" align="end">
@@ -327,10 +353,19 @@ function Bar({ detail, builder, withToml, onWithToml }: BarProps) {
           : builder.changed
             ? "Not saved; your work is in this browser only."
             : `Saved as version ${detail.summary.version}.`}
+        {builder.empty.length > 0 && ` Clips are missing: ${namesOf(builder.empty)}.`}
         {status === "live" && " This study is live: saving creates a new version. Runs in progress keep theirs."}
       </Text>
     </div>
   );
+}
+
+const MAX_NAMED = 4;
+
+/** "rosie/slow, no. 2; rosie/fast, no. 2 and 3 more" */
+function namesOf(names: readonly string[]): string {
+  const more = names.length - MAX_NAMED;
+  return `${names.slice(0, MAX_NAMED).join("; ")}${more > 0 ? ` and ${String(more)} more` : ""}`;
 }
 
 function Sections({ study, builder, current }: { study: string; builder: Builder; current: string }) {

@@ -5,6 +5,7 @@
  */
 
 import { type Data, isTable } from "./data";
+import type { Place } from "./places";
 
 export interface Kept {
   toml: string;
@@ -14,6 +15,8 @@ export interface Kept {
   revision: number;
   /** The stored text that the work began from; null in work that was kept before this was. */
   base: string | null;
+  /** Clips in other cells than stored; null where none was moved. */
+  places: readonly Place[] | null;
   at: string;
 }
 
@@ -55,13 +58,18 @@ function taken(): string | null {
   }
 }
 
+/** Stored work as it was kept; null where it is anything else. */
+function keptFrom(stored: unknown): Kept | null {
+  if (typeof stored !== "object" || stored === null) return null;
+  const { toml, data, revision, base, at, places } = stored as Partial<Kept>;
+  if (typeof toml !== "string" || typeof revision !== "number" || typeof at !== "string") return null;
+  const texts = { toml, base: typeof base === "string" ? base : null, at };
+  return { ...texts, data: isTable(data) ? data : null, revision, places: Array.isArray(places) ? places : null };
+}
+
 function read(where: string): Kept | null {
   try {
-    const stored: unknown = JSON.parse(localStorage.getItem(where) ?? "null");
-    if (typeof stored !== "object" || stored === null) return null;
-    const { toml, data, revision, base, at } = stored as Partial<Kept>;
-    if (typeof toml !== "string" || typeof revision !== "number" || typeof at !== "string") return null;
-    return { toml, data: isTable(data) ? data : null, revision, base: typeof base === "string" ? base : null, at };
+    return keptFrom(JSON.parse(localStorage.getItem(where) ?? "null"));
   } catch {
     return null;
   }

@@ -1,12 +1,13 @@
 /** The builder's state: what is edited, its TOML as the server writes it, what is wrong with it. */
 
-import { useQueryClient } from "@tanstack/react-query";
+import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { createContext, useContext, useEffect, useMemo, useState } from "react";
-import { api, Refused, type Schemas, unwrap, sessionQuery } from "../api";
+import { api, clipsQuery, Refused, type Schemas, unwrap, sessionQuery } from "../api";
 import { type Data, isTable, listAt, type Path, textAt } from "./data";
-import { begun, edited, type History, latestToml, redone, rewritten, undone, written } from "./history";
+import { begun, edited, type History, latestToml, rearranged, redone, rewritten, undone, written } from "./history";
 import { DEFAULT_KIND } from "../kinds";
 import { forgetWork, keepWork } from "./kept";
+import { arrangementOf, isAsStored, type Place, reconciled, storedPlaces } from "./places";
 
 type Problem = Schemas["ProblemOut"];
 
@@ -25,6 +26,13 @@ export interface Builder {
   trialKind: string;
   error: Error | null;
   set: (path: Path, value: unknown) => void;
+  /** Every clip with its cell; null for studies whose clips are rendered, and until they are loaded. */
+  places: readonly Place[] | null;
+  /** Whether clips are in other cells than stored. */
+  moved: boolean;
+  /** Names of places in cells that have no clip. */
+  empty: string[];
+  arrange: (places: readonly Place[], data?: Data) => void;
   setToml: (toml: string) => void;
   undo: (() => void) | null;
   redo: (() => void) | null;
@@ -50,11 +58,14 @@ type Answered = Schemas["EditedDefinition"] & { asked: Schemas["EditDefinition"]
 interface Start {
   data: Data;
   toml: string;
+  places: readonly Place[] | null;
 }
 
-export function useBuilder({ summary, toml: stored, definition }: Schemas["StudyDetail"], start: Start): Builder {
+export function useBuilder({ summary, toml: stored, definition, rendered }: Schemas["StudyDetail"], start: Start): Builder {
   const { name: study, revision } = summary;
-  const [history, setHistory] = useState<History>(() => begun(start.data, start.toml));
+  const [history, setHistory] = useState<History>(() => begun(start.data, start.toml, start.places));
+  const clips = useQuery({ ...clipsQuery(study), enabled: !rendered }).data;
+  const inCells = useMemo(() => (clips === undefined || rendered ? null : storedPlaces(clips)), [clips, rendered]);
   // Text that is being edited by hand; null where forms and text say the same.
   const [text, setText] = useState<string | null>(null);
   const [answer, setAnswer] = useState<Answered | null>(null);
@@ -78,7 +89,7 @@ export function useBuilder({ summary, toml: stored, definition }: Schemas["Study
         if (written_data !== null) setHistory((before) => written(before, written_data, said.toml));
         else if (text !== null && isTable(said.data)) {
           const read = said.data;
-          setHistory((before) => rewritten(before, text, read, Date.now()));
+          setHistory((before) => rewritten(before, text, read, Date.now(), inCells));
           setText(null);
         }
       } catch (refusal) {
@@ -93,12 +104,21 @@ export function useBuilder({ summary, toml: stored, definition }: Schemas["Study
       over = true;
       clearTimeout(timer);
     };
-  }, [asked, text, queries]);
+  }, [asked, text, queries, inCells]);
   const present = text ?? toml;
+  const moves = useMemo(() => {
+    const own = history.now.places;
+    return own === null || (inCells !== null && isAsStored(own, inCells, data)) ? null : own;
+  }, [history.now.places, inCells, data]);
   useEffect(() => {
-    if (present === stored) forgetWork(study);
-    else keepWork(study, { toml: present ?? base, data: present === null ? data : null, revision, base: stored });
-  }, [present, base, data, stored, study, revision]);
+    if (present === stored && moves === null) forgetWork(study);
+    else keepWork(study, { toml: present ?? base, data: present === null ? data : null, revision, base: stored, places: moves });
+  }, [present, base, data, stored, study, revision, moves]);
+  const places = useMemo(() => placesNow(moves, inCells), [moves, inCells]);
+  const empty = useMemo(() => {
+    const filled = places === null ? [] : arrangementOf(places, data).filled;
+    return filled.flatMap(({ slot, clip }) => (clip === null ? [slot.name] : []));
+  }, [places, data]);
   const travel = (to: (history: History) => History) => () => {
     setText(null);
     setHistory(to);
@@ -114,13 +134,26 @@ export function useBuilder({ summary, toml: stored, definition }: Schemas["Study
     languages: languagesOf(data),
     trialKind: textAt(data, ["trial", "kind"]) || DEFAULT_KIND,
     error,
-    set: (path, value) => setHistory((before) => edited(before, path, value, Date.now(), definition)),
+    set: (path, value) => setHistory((before) => edited(before, path, value, Date.now(), definition, inCells)),
+    places,
+    moved: moves !== null,
+    empty,
+    arrange: (next, withData) => setHistory((before) => rearranged(before, next, withData ?? before.now.data, Date.now())),
     setToml: setText,
     undo: history.past.length > 0 ? travel(undone) : null,
     redo: history.future.length > 0 ? travel(redone) : null,
-    changed: present !== stored,
-    reset: () => setText(stored),
+    changed: present !== stored || moves !== null,
+    reset: () => {
+      if (moves !== null) setHistory((before) => rearranged(before, null, before.now.data, Date.now()));
+      if (present !== stored) setText(stored);
+    },
   };
+}
+
+/** Clips that were moved, with what the study has now; clips of an upload stay until it is saved. */
+function placesNow(moves: readonly Place[] | null, inCells: readonly Place[] | null): readonly Place[] | null {
+  if (moves === null || inCells === null) return inCells;
+  return reconciled(moves, [...inCells, ...moves.filter(({ upload }) => upload !== null)]);
 }
 
 function languagesOf(data: Data): string[] {

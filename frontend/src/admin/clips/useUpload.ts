@@ -157,6 +157,9 @@ function withTried(upload: Schemas["UploadOut"], tried: Tried | undefined): Sche
 const LOOK_EVERY_MS = 700;
 const storageKey = (purpose: string) => `palpebra.upload.${purpose}`;
 
+/** The next page begins without the upload for this purpose: its clips are in a study. */
+export const forgetUpload = (purpose: string) => localStorage.removeItem(storageKey(purpose));
+
 export interface Upload {
   /** Files that are there, of those that are being sent; null where nothing is sent. */
   sending: { sent: number; of: number } | null;
@@ -228,7 +231,7 @@ export function useUpload(purpose: string): Upload {
     staleTime: Infinity,
   });
   const forget = () => {
-    localStorage.removeItem(storageKey(purpose));
+    forgetUpload(purpose);
     setId(null);
     setSending(null);
     send.reset();

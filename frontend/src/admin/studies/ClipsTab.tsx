@@ -25,6 +25,8 @@ function AddClips({ study }: { study: string }) {
   const needed = upload?.has_manifest === true ? false : patternProblem(pattern, files);
   const notPlayed = playNeeded(sent);
   const kept = keptWork(study);
+  // The builder saves clips in other cells itself.
+  const moved = kept?.places != null && "clips that were moved in the builder saved, or discarded there";
   const save = useChange(
     () => {
       const revision = detail?.summary.revision ?? 1;
@@ -49,7 +51,7 @@ function AddClips({ study }: { study: string }) {
         <Text size="sm">
           A clip replaces the one with the same levels and exemplar. For a new level, add the level in the builder first, leave it unsaved,
           and return here; both are saved together.
-          {kept !== null && " Unsaved work of the builder will be saved with them."}
+          {kept !== null && moved === false && " Unsaved work of the builder will be saved with them."}
         </Text>
         <UploadClips upload={sent} />
         {upload !== null && upload.files.length > 0 && (
@@ -65,12 +67,12 @@ function AddClips({ study }: { study: string }) {
             )}
             <Button
               loading={save.isPending}
-              disabled={detail === undefined || needed !== false || notPlayed !== false}
+              disabled={detail === undefined || [needed, notPlayed, moved].some(Boolean)}
               onClick={() => save.mutate(undefined)}
             >
               Save as a new version
             </Button>
-            <StillNeeded parts={[needed, notPlayed]} />
+            <StillNeeded parts={[needed, notPlayed, moved]} />
           </Group>
         )}
       </Stack>
