@@ -29,8 +29,11 @@ NAMED_MAX = 6
 ScoreMethod = Literal["acr", "acr-hr", "ccr", "dscqs"]
 P913_BELOW = 0.75
 """P.913: a lower correlation with the mean votes excludes."""
+P913_CONDITIONS_BELOW = 0.8
+"""P.913 with conditions: the correlation of a person's means of conditions is lower than this as well."""
 RATERS_MIN = 3
 """Fewer raters cannot be distinguished by their likeness to the mean."""
+CONDITIONS_MIN = 3
 FAR_SHARE, LEAN_MAX = 0.05, 0.3
 """BT.500: more than this share of votes is far, and the sides differ by less than this share of them."""
 
@@ -53,6 +56,8 @@ class Standard:
         acr-hr: whether scores above the highest point are pulled toward it.
     z_scores : bool
         Whether each person's votes are standardized, in each session if `session` names its column.
+    condition : str or None
+        Column that names what was done to the item, such as its codec; for screening by P.913.
     """
 
     method: ScoreMethod = "acr"
@@ -62,6 +67,7 @@ class Standard:
     crush: bool = False
     z_scores: bool = False
     session: str | None = None
+    condition: str | None = None
 
     def check(self) -> None:
         """Refuse options that do not belong together; InputError says what to add or remove."""
@@ -131,11 +137,12 @@ class Screening(TypedDict):
     below: float
 
 
-def screen_raters(scores: Array, screening: Screening) -> dict[int, str]:
+def screen_raters(scores: Array, screening: Screening, conditions: Codes | None = None) -> dict[int, str]:
     """Return the raters (by row of `scores`, people by items, NaN for no vote) to leave out, with the reason.
 
     BT.500 is applied once, as it demands. P.913 leaves out the rater of the lowest correlation, computes the
-    means again, and goes on until no correlation is too low.
+    means again, and goes on until no correlation is too low. With the `conditions` (items,) it spares raters
+    whose means of conditions correlate with everybody's by .8 or more.
     """
     if len(scores) < RATERS_MIN:
         return {}
@@ -146,22 +153,37 @@ def screen_raters(scores: Array, screening: Screening) -> dict[int, str]:
             int(k): f"{above[k]} of {n[k]} ratings far above and {below[k]} far below the means"
             for k in np.flatnonzero(rejected)
         }
-    return _by_correlation(scores, screening["below"])
+    return _by_correlation(scores, screening["below"], conditions)
 
 
-def _by_correlation(scores: Array, limit: float) -> dict[int, str]:
+def _by_correlation(scores: Array, limit: float, conditions: Codes | None) -> dict[int, str]:
     reasons: dict[int, str] = {}
     kept = np.ones(len(scores), dtype=bool)
     while kept.sum() >= RATERS_MIN:
         # People who have gone must never be the lowest again.
         r = np.full(len(scores), np.inf)
         r[kept] = mean_correlations(scores[kept])
+        by_condition = np.full(len(scores), -np.inf)
+        if conditions is not None:
+            by_condition[kept] = mean_correlations(_condition_means(scores[kept], conditions))
+            r[by_condition >= P913_CONDITIONS_BELOW] = np.inf
         lowest = int(np.argmin(r))
         if not r[lowest] < limit:
             break
         reasons[lowest] = f"correlation {r[lowest]:.2f} with the mean ratings, below {limit:g}"
+        if conditions is not None:
+            reasons[lowest] += (
+                f", and {by_condition[lowest]:.2f} by condition, below {P913_CONDITIONS_BELOW:g}"
+            )
         kept[lowest] = False
     return reasons
+
+
+def _condition_means(scores: Array, conditions: Codes) -> Array:
+    """Each person's mean vote on each condition (people, conditions); NaN where the person has no vote."""
+    member = np.eye(int(conditions.max()) + 1)[conditions]
+    n = np.isfinite(scores) @ member
+    return np.asarray(np.divide(np.nan_to_num(scores) @ member, n, out=np.full(n.shape, np.nan), where=n > 0))
 
 
 def mean_correlations(scores: Array) -> Array:
@@ -272,7 +294,8 @@ def read_votes_by(
     `columns` are those of the item, the person and the vote; see `read_votes`.
     """
     standard.check()
-    more = [name for name in (standard.reference, standard.first, standard.session, by) if name]
+    of_standard = (standard.reference, standard.first, standard.session, standard.condition)
+    more = [name for name in (*of_standard, by) if name]
     roles = [*columns, *more]
     refuse_shared_roles(roles)
     table = read_text_table(path, roles, EXPORT_COLUMNS)
@@ -363,7 +386,7 @@ def _votes(
     decisions = [*table.decisions, *said]
     stays = np.ones(people.size, dtype=bool)
     if screening is not None:
-        reasons = screen_raters(scores, screening)
+        reasons = screen_raters(scores, screening, _conditions(table, standard.condition, which, items, keep))
         stays[list(reasons)] = False
         rule = {"bt500": "BT.500", "p913": "P.913"}[screening["rule"]]
         decisions += [f"{rule} excluded {people[k]}: {why}" for k, why in reasons.items()]
@@ -386,6 +409,28 @@ def _votes(
         return votes
     named = table.columns[standard.reference].astype(str).to_numpy()[keep]
     return _against_references(votes, which, named, standard)
+
+
+def _conditions(
+    table: TextTable, column: str | None, which: Codes, items: Sequence[str], keep: Flags
+) -> Codes | None:
+    """The condition of each item."""
+    if column is None:
+        return None
+    texts_required(table, column)
+    names, codes = np.unique(table.columns[column].astype(str).to_numpy()[keep], return_inverse=True)
+    if len(names) < CONDITIONS_MIN:
+        raise InputError(
+            f"expected {CONDITIONS_MIN} conditions or more in '{column}', got {len(names)}; omit --condition"
+        )
+    of_item = np.zeros(len(items), dtype=np.int64)
+    of_item[which] = codes
+    if (different := of_item[which] != codes).any():
+        item = items[int(which[different][0])]
+        raise InputError(
+            f"item '{item}' has several values of '{column}'; expected one condition for each item"
+        )
+    return of_item
 
 
 def _against_references(votes: Votes, which: Codes, named: NDArray[Any], standard: Standard) -> Votes:

@@ -18,6 +18,7 @@ from analysis.commands.output import (
     show_tables,
     show_text,
 )
+from experiments.errors import InputError
 
 if TYPE_CHECKING:
     from analysis.report.contents import Picture
@@ -204,6 +205,15 @@ def opinion(
         ScreenChoice,
         typer.Option(help="Exclude unlike raters by bt500 or p913 (correlation with the mean below .75)."),
     ] = ScreenChoice.NONE,
+    condition: Annotated[
+        str | None,
+        typer.Option(
+            help=(
+                "Column of what was done to the item (its codec), for --screen p913: raters whose means of "
+                "conditions correlate by .8 or more stay."
+            )
+        ),
+    ] = None,
     repeats: Annotated[
         RepeatsChoice,
         typer.Option(help="A person's repeated votes on an item: mean (n is people) or votes (n is votes)."),
@@ -229,7 +239,9 @@ def opinion(
 
     bounds = scale_bounds(scale)
     highest = None if bounds is None else bounds[1]
-    standard = Standard(method.value, reference, first, highest, crush, z_scores, session)
+    standard = Standard(method.value, reference, first, highest, crush, z_scores, session, condition)
+    if condition is not None and screen is not ScreenChoice.P913:
+        raise InputError("--condition is for --screen p913; add it, or remove --condition")
     screening: Screening | None = None
     if screen is not ScreenChoice.NONE:
         screening = {"rule": "p913" if screen is ScreenChoice.P913 else "bt500", "below": P913_BELOW}

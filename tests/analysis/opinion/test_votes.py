@@ -116,6 +116,34 @@ def test_p913_leaves_out_the_lowest_first_and_computes_the_means_again() -> None
     assert screen_raters(scores[2:], P913) == {}
 
 
+def test_p913_with_conditions_keeps_a_rater_who_is_unsteady_on_clips_alone(tmp_path: Path) -> None:
+    random = np.random.default_rng(4)
+    conditions = np.repeat(np.arange(6), 8)
+    quality = 1.5 + 0.5 * conditions
+    scores = quality + 0.3 * random.normal(size=(10, 48))
+    scores[0] = quality + 2.3 * random.normal(size=48)
+    scores[1] = 6 - quality + 1.6 * random.normal(size=48)
+    means = np.array([[row[conditions == k].mean() for k in range(6)] for row in scores])
+    by_clip, by_condition = (np.corrcoef(t[0], t.mean(axis=0))[0, 1] for t in (scores, means))
+    assert by_clip < 0.75 < 0.8 < by_condition
+    assert list(screen_raters(scores, P913)) == [1, 0]
+    reasons = screen_raters(scores, P913, conditions)
+    assert list(reasons) == [1]
+    assert f"and {np.corrcoef(means[1], means.mean(axis=0))[0, 1]:.2f} by condition" in reasons[1]
+    rows = [f"p{p},c{c:02d},{value:g},q{conditions[c]},{p % 3}" for (p, c), value in np.ndenumerate(scores)]
+    path = votes_file(tmp_path, "id,clip,score,codec,day", rows)
+    base = ["opinion", str(path), "--item", "clip", "--participant", "id", "--rating", "score"]
+    result = CliRunner().invoke(app, [*base, "--screen", "p913", "--condition", "codec"])
+    said = " ".join(result.stdout.split())
+    assert "P.913 excluded p1: correlation" in said
+    assert "excluded p0" not in said
+    for more, refusal in (
+        (["--condition", "codec"], "--condition is for --screen p913"),
+        (["--screen", "p913", "--condition", "day"], "has several values of 'day'"),
+    ):
+        assert refusal in str(CliRunner().invoke(app, [*base, *more]).exception)
+
+
 def test_a_rater_who_says_the_same_of_everything_goes_and_two_raters_stay() -> None:
     scores = rated(1)
     scores[0] = 3.0
