@@ -265,8 +265,8 @@ def fit_crossed(data: CrossedPairs, start: Fit) -> tuple[Fit, tuple[RandomEffect
         sd = abs(float(theta[len(start.parameters) + index]))
         if sd > SD_MAX:
             raise InputError(
-                f"the SD of '{name}' has no largest likelihood (above {SD_MAX:g} log odds), since answers "
-                "of each hardly ever contradict one another; remove --crossed, or collect more comparisons"
+                f"the SD of '{name}' grows without limit (above {SD_MAX:g} log odds): answers of each hardly "
+                "ever contradict one another. Remove --crossed, or collect more comparisons"
             )
         effects.append(RandomEffect(name, data.levels[index], sd, chi2, p))
     covariance = _covariance(data, theta)[: len(start.parameters), : len(start.parameters)]

@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from experiments.declaration.base import Declaration
+from experiments.rules.screening import FAILED_CHECK
 
 # A rule of [[exclusions]] excludes whole runs or single trials, based on their data.
 # A rule is a class: its keys, and a method that decides. The analysis calls it for every kind of trial.
@@ -42,7 +43,7 @@ class RunTrials:
 
 # Decision 0510: An exclusion rule is one file.
 class LeavesOutRuns(Declaration):
-    """A rule about runs: its method `excludes(run: RunTrials) -> str | None` returns the reason.
+    """A rule about runs: its method `excludes(run: RunTrials) -> str | None` says why, `reason()` what for.
 
     Attributes
     ----------
@@ -88,6 +89,10 @@ class DropFailedPlays(LeavesOutTrials):
     """The name of this rule."""
     needed: ClassVar[str] = "verdict"
 
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return "a clip that was not shown as declared"
+
     def drops(self, value: str | float) -> bool:
         """Whether a play failed."""
         return value == "failed"
@@ -104,6 +109,10 @@ class DropSlowTrials(LeavesOutTrials):
     above_ms: Annotated[float, Field(gt=0)] = 60_000.0
     """Response time above which a trial is excluded, in ms from the end of the clip."""
     needed: ClassVar[str] = "rt"
+
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return f"an answer more than {self.above_ms / 1000:g} s after the clip"
 
     def drops(self, value: str | float) -> bool:
         """Whether an answer came late."""
@@ -122,6 +131,10 @@ class ExcludeAttention(LeavesOutRuns):
     """Number of failed checks that is still allowed; 0 excludes at the first failure."""
     needed: ClassVar[tuple[str, ...]] = ("expected_response", "response")
     source: ClassVar[Source] = "attention"
+
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return f"{self.more_than + 1} or more failed attention checks" if self.more_than else FAILED_CHECK
 
     def excludes(self, run: RunTrials) -> str | None:
         """How many checks were answered incorrectly, or not at all."""
@@ -146,6 +159,11 @@ class ExcludeEvidence(LeavesOutRuns):
     needed: ClassVar[tuple[str, ...]] = ("evidence_verdict",)
     source: ClassVar[Source] = "rows"
 
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        verdicts = " or ".join(verdict.replace("_", " ") for verdict in self.verdicts)
+        return f"evidence of a person that was {verdicts}"
+
     def excludes(self, run: RunTrials) -> str | None:
         """The verdict."""
         verdict = run.texts("evidence_verdict")[0] or "not_judged"
@@ -163,6 +181,10 @@ class ExcludeFast(LeavesOutRuns):
     below_ms: Annotated[float, Field(gt=0)] = 200.0
     """Median response time below which a run is excluded, in ms from the end of the clip."""
     needed: ClassVar[tuple[str, ...]] = ("rt",)
+
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return f"a median response time below {self.below_ms:g} ms"
 
     def excludes(self, run: RunTrials) -> str | None:
         """The median response time."""
@@ -182,6 +204,10 @@ class ExcludeIncomplete(LeavesOutRuns):
     needed: ClassVar[tuple[str, ...]] = ("run_status",)
     source: ClassVar[Source] = "rows"
 
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return "an unfinished visit"
+
     def excludes(self, run: RunTrials) -> str | None:
         """The state of a run that is not complete."""
         status = run.texts("run_status")[0]
@@ -199,6 +225,10 @@ class ExcludePlayback(LeavesOutRuns):
     more_than: Annotated[float, Field(ge=0, le=1)] = 0.2
     """Share of flagged or failed presentations above which a run is excluded, from 0 to 1."""
     needed: ClassVar[tuple[str, ...]] = ("verdict",)
+
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return f"more than {self.more_than:.0%} of clips not shown as declared"
 
     def excludes(self, run: RunTrials) -> str | None:
         """The share of poor presentations."""
@@ -219,6 +249,10 @@ class ExcludeStraightLining(LeavesOutRuns):
     """Share of trials with the most frequent answer above which a run is excluded, from 0 to 1."""
     needed: ClassVar[tuple[str, ...]] = ("response",)
 
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return f"the same answer in more than {self.more_than:.0%} of trials"
+
     def excludes(self, run: RunTrials) -> str | None:
         """The share of the most frequent answer."""
         given = run.given("response")
@@ -235,6 +269,10 @@ class ScreenByBT500(ScreensRaters):
     rule: Literal["bt500"] = "bt500"
     """The name of this rule."""
 
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return "ratings far from the mean, above and below alike (ITU-R BT.500)"
+
 
 class ScreenByP913(ScreensRaters):
     """Exclude raters by ITU-T P.913: a low correlation with the mean ratings, the lowest first."""
@@ -243,3 +281,7 @@ class ScreenByP913(ScreensRaters):
     """The name of this rule."""
     below: Annotated[float, Field(gt=0, lt=1)] = 0.75
     """Correlation with the mean ratings of clips below which a rater is excluded."""
+
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return f"a correlation below {self.below:g} with the mean ratings of clips (ITU-T P.913)"

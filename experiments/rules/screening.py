@@ -29,6 +29,9 @@ class AttentionChecks(Declaration):
 # Screening by failed attention checks.
 
 
+FAILED_CHECK = "a failed attention check"
+
+
 class ScreenAttention(Declaration):
     """Screen out participants who failed more than `more_than` attention checks."""
 
@@ -36,6 +39,10 @@ class ScreenAttention(Declaration):
     """The name of this rule."""
     more_than: Annotated[int, Field(ge=0)] = 0
     """Number of failed checks that is still allowed; 0 ends the run at the first failure."""
+
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return f"{self.more_than + 1} or more failed attention checks" if self.more_than else FAILED_CHECK
 
 
 # Screening by the device.
@@ -49,6 +56,10 @@ class ScreenDevice(Declaration):
 
     rule: Literal["device"] = "device"
     """The name of this rule."""
+
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        return "a browser, screen or window that cannot show the clips"
 
 
 # Screening by an answer of a form.
@@ -74,6 +85,13 @@ class ScreenFormAnswer(Declaration):
     """Numbers smaller than this end the run; for numbers and ratings."""
     above: int | None = None
     """Numbers larger than this end the run; for numbers and ratings."""
+
+    def reason(self) -> str:
+        """The reason in words, for a Methods section."""
+        low = [] if self.below is None else [f"below {self.below}"]
+        high = [] if self.above is None else [f"above {self.above}"]
+        answers = " or ".join([*self.refused, *low, *high])
+        return f"the answer {answers} to '{self.field}' of the form '{self.form}'"
 
     def screens_out(self, answer: object) -> bool:
         """True if this answer (text, number, or list of texts) ends the run."""

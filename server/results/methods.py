@@ -1,6 +1,7 @@
 """The Methods of a study, from its declaration, its stored runs and, where there is one, its report."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -75,7 +76,8 @@ def _runs_elsewhere(session: Session, study: Study, origin: str, series: int) ->
 
 def paragraph_of(known: MethodsFigures, results: dict[str, Any] | None) -> Methods:
     """The paragraph of what was counted, and of the results of a report."""
-    excluded = _exclusion_counts(results)
+    reasons: dict[str, str] = {rule.rule: rule.reason() for rule in known.described.experiment.exclusions}
+    excluded = _exclusion_counts(results, reasons)
     described = replace(
         known.described,
         rules=[(name, words) for name, (words, _) in excluded.items()],
@@ -108,13 +110,15 @@ def write_beside(folder: Path, methods: Methods) -> None:
         (folder / f"methods.{name}").write_text(content, encoding="utf-8")
 
 
-def _excluded(noun: str, rule: str) -> str:
-    name = f"{noun}s_{_key(rule)}"
-    return f"{{{name}}} {{{name}:{noun}|{noun}s}} ({_words(rule)})"
+def _exclusion_counts(
+    results: dict[str, Any] | None, reasons: Mapping[str, str]
+) -> dict[str, tuple[str, Number]]:
+    """Number of runs (or trials) by declared rule, as the report counts them."""
 
+    def said(noun: str, rule: str) -> str:
+        name = f"{noun}s_{_key(rule)}"
+        return f"{{{name}}} {{{name}:{noun}|{noun}s}} for {reasons.get(rule, rule.replace('_', ' '))}"
 
-def _exclusion_counts(results: dict[str, Any] | None) -> dict[str, tuple[str, Number]]:
-    """Number of runs (or trials) by declared rule, as the report of the analysis counts them."""
     left_out = (results or {}).get("exclusions") or {}
     counts: dict[str, int] = {}
     for run in left_out.get("runs", []):
@@ -122,20 +126,16 @@ def _exclusion_counts(results: dict[str, Any] | None) -> dict[str, tuple[str, Nu
             rule = str(reason).split(":", 1)[0]
             counts[rule] = counts.get(rule, 0) + 1
     excluded = {
-        f"visits_{_key(rule)}": (_excluded("visit", rule), count, "exclusions.runs[].reasons")
+        f"visits_{_key(rule)}": (said("visit", rule), count, "exclusions.runs[].reasons")
         for rule, count in counts.items()
     }
     for dropped in left_out.get("trials", []):
-        words = _excluded("trial", dropped["rule"])
+        words = said("trial", dropped["rule"])
         excluded[f"trials_{_key(dropped['rule'])}"] = (words, int(dropped["trials"]), "exclusions.trials[]")
     return {
         name: (words, Number(name, count, f"{RESULTS} of the report: {source} of this rule"))
         for name, (words, count, source) in excluded.items()
     }
-
-
-def _words(rule: str) -> str:
-    return rule.replace("_", " ")
 
 
 def _key(rule: str) -> str:

@@ -272,7 +272,7 @@ Rule = ScreeningRule | ExclusionRule
 def _in_force(
     of: DescribedSeries, rules_of: Callable[[Experiment], Sequence[Rule]]
 ) -> tuple[list[str], dict[tuple[int, ...], list[str]]]:
-    """Names of the rules that held for every visit, and those of others by the versions that have them.
+    """Words of the rules that held for every visit, and those of others by the versions that have them.
 
     A rule whose limits were changed is another rule.
     """
@@ -282,7 +282,7 @@ def _in_force(
     for version, experiment in every:
         for rule in rules_of(experiment):
             key = rule.model_dump_json()
-            names[key] = rule.rule.replace("_", " ")
+            names[key] = rule.reason()
             versions.setdefault(key, []).append(version.number)
     always = list(dict.fromkeys(names[key] for key, used in versions.items() if len(used) == len(every)))
     partly: dict[tuple[int, ...], list[str]] = {}
@@ -295,14 +295,15 @@ def _in_force(
 def _screening(of: DescribedSeries) -> list[str]:
     always, partly = _in_force(of, lambda experiment: experiment.screening)
     lines = (
-        [f"The following screening rules were declared before data collection: {', '.join(always)}."]
+        [f"The following reasons for screening were declared before data collection: {'; '.join(always)}."]
         if always
         else []
     )
     for versions, names in partly.items():
         visits = of.begun_with(versions)
         lines.append(
-            f"The following screening rules applied to {{{visits}}} of {{begun}} visits: {', '.join(names)}."
+            f"The following reasons for screening applied to {{{visits}}} of {{begun}} visits: "
+            f"{'; '.join(names)}."
         )
     return lines
 
@@ -322,13 +323,10 @@ def _warnings(of: DescribedSeries) -> list[str]:
     return [f"Participants were warned about {names} in {{warned}} {{warned:visit|visits}}.{ended}"]
 
 
-RULE_WORDS = {"bt500": "screening of raters by ITU-R BT.500", "p913": "screening of raters by ITU-T P.913"}
-
-
 def _exclusions(of: DescribedSeries) -> list[str]:
     lines = _declared_exclusions(of)
     if of.rules:
-        lines.append(f"These rules excluded {', '.join(words for _, words in of.rules)}.")
+        lines.append(f"The analysis excluded {'; '.join(words for _, words in of.rules)}.")
     if of.value("excluded_by_hand"):
         lines.append(
             "{excluded_by_hand} {excluded_by_hand:visit was|visits were} excluded manually, with a "
@@ -342,10 +340,7 @@ def _exclusions(of: DescribedSeries) -> list[str]:
 def _declared_exclusions(of: DescribedSeries) -> list[str]:
     """Of the newest version, which the analysis follows: declared before every visit, or later."""
     always, _ = _in_force(of, lambda experiment: experiment.exclusions)
-    now = {
-        rule.model_dump_json(): RULE_WORDS.get(rule.rule, rule.rule.replace("_", " "))
-        for rule in of.experiment.exclusions
-    }
+    now = {rule.model_dump_json(): rule.reason() for rule in of.experiment.exclusions}
     before = [name for name in dict.fromkeys(now.values()) if name in always]
     later: dict[tuple[int, ...], list[str]] = {}
     for key, name in now.items():
@@ -358,15 +353,15 @@ def _declared_exclusions(of: DescribedSeries) -> list[str]:
             later.setdefault(without, []).append(name)
             before = [one for one in before if one != name]
     lines = (
-        [f"The following exclusion rules were declared before data collection: {', '.join(before)}."]
+        [f"The following reasons for exclusion were declared before data collection: {'; '.join(before)}."]
         if before
         else []
     )
     for without, names in later.items():
         visits = of.begun_with(without)
         lines.append(
-            f"The following exclusion rules were declared or changed after {{{visits}}} "
-            f"{{{visits}:visit|visits}} had begun: {', '.join(names)}."
+            f"The following reasons for exclusion were declared or changed after {{{visits}}} "
+            f"{{{visits}:visit|visits}} had begun: {'; '.join(names)}."
         )
     return lines or ["No exclusion rule was declared before data collection."]
 

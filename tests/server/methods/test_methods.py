@@ -78,7 +78,7 @@ def test_the_counts_are_those_of_the_runs(
     )
     assert "No participant has completed" not in answer["paragraph"]
     assert "and one was not finished" in answer["paragraph"]
-    assert "attention checks failed" in answer["paragraph"]
+    assert "declared before data collection: a failed attention check." in answer["paragraph"]
     with services.database.read() as session:  # as somebody who doubts a number would
         declared = [one for one in answer["numbers"] if one["source"].startswith("declaration: ")]
         assert {one["name"]: one["value"] for one in declared} == {
@@ -112,7 +112,8 @@ def test_a_report_adds_what_each_declared_rule_left_out(
         found = methods_of(
             session, find_study(session, "short", OPERATOR, "view"), "participant", None, results
         )
-    assert "excluded two visits (attention checks failed), nine trials (slow trials)." in found.plain()
+    said = "excluded two visits for a failed attention check; nine trials for slow trials."
+    assert said in found.plain()
     assert json.loads(found.json())["paragraph"] == found.plain()
 
 
@@ -275,15 +276,15 @@ def test_rules_are_declared_before_the_data_only_where_every_visit_had_them(
 ) -> None:
     complete(client, study.link_token)
     save_version(owner, SHORT + MORE_RULES)
-    later = "declared or changed after one visit had begun: median response time."
+    later = "declared or changed after one visit had begun: a median response time below 200 ms."
     said = paragraph(viewer)
-    assert "rules were declared before data collection: attention checks failed." in said
+    assert "exclusion were declared before data collection: a failed attention check." in said
     assert later in said
-    assert "screening rules" not in said
+    assert "reasons for screening" not in said
     complete(client, study.link_token)
     said = paragraph(viewer)
     assert later in said
-    assert "screening rules applied to one of two visits: form answer." in said
+    assert "screening applied to one of two visits: the answer " in said
     assert values(viewer, services)["begun_with_2"] == 1
     # Another limit is another rule: the data were there when it was chosen.
     save_version(
@@ -291,7 +292,7 @@ def test_rules_are_declared_before_the_data_only_where_every_visit_had_them(
     )
     said = paragraph(viewer)
     assert "before data collection" not in said.replace("No exclusion rule was declared before", "")
-    assert "changed after two visits had begun: attention checks failed." in said
+    assert "changed after two visits had begun: 2 or more failed attention checks." in said
 
 
 def test_a_number_of_checks_that_was_changed_is_not_stated_as_one(
