@@ -6,7 +6,8 @@ from alembic import context
 from sqlalchemy import Connection
 
 from server.core.db import open_database
-from server.core.migrate import derived_anew, migration_transaction, refuse_without_views, revision_of
+from server.core.migrate import derived_anew, migration_transaction, refuse_without_views
+from server.core.repository import stored_revision
 from server.core.settings import Settings
 from server.models import Base, UtcDateTime
 
@@ -35,8 +36,8 @@ else:
     database = open_database(Settings())
     context.config.attributes["secret_key"] = database.secret_key
     with migration_transaction(database) as connection:
-        before = revision_of(connection)
+        before = stored_revision(connection)
         with derived_anew(connection):
             migrate(connection)
-        refuse_without_views(before, revision_of(connection))
+        refuse_without_views(before, stored_revision(connection))
     database.close()

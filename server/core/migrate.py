@@ -1,21 +1,25 @@
-"""Bring a database to the newest revision, or report which one it has."""
+"""Bring a database to the newest revision, or report which one it has.
 
+Alembic is imported where something is migrated: loading it takes a tenth of the time of a start.
+"""
+
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from alembic.util import CommandError
 from sqlalchemy import Connection
 
 import migrations
 from server.core.database_views import drop_views, make_views, refusals_in_one_line, views_are_current
 from server.core.db import Database
-from server.core.repository import wait_for_other_migrations
+from server.core.repository import stored_revision, wait_for_other_migrations
 from server.core.row_security import raise_wall, take_down_wall
+
+if TYPE_CHECKING:
+    from alembic.config import Config
 
 FIRST_WITH_DERIVED_VIEWS = "0033"
 """From here on programs make their views themselves; those of earlier revisions had migrations for that."""
@@ -23,8 +27,10 @@ FIRST_WITH_DERIVED_VIEWS = "0033"
 
 def alembic_config(
     connection: Connection | None = None, secret_key: Callable[[], bytes] | None = None
-) -> Config:
+) -> "Config":
     """Alembic's settings, working on `connection`; a revision that encrypts asks for the secret key."""
+    from alembic.config import Config
+
     config = Config()
     config.set_main_option("script_location", str(Path(migrations.__file__).parent))
     config.set_main_option("path_separator", "os")
@@ -52,13 +58,15 @@ def upgrade(database: Database) -> tuple[str | None, str | None]:
     Views that differ from this program's columns are created again, with no new revision too.
     """
     with migration_transaction(database) as connection:
-        before = revision_of(connection)
+        before = stored_revision(connection)
         if before == newest_revision() and views_are_current(connection):
             _raise_wall_at_newest(connection)
             return before, before
+        from alembic import command
+
         with derived_anew(connection):
             command.upgrade(alembic_config(connection, database.secret_key), "head")
-        return before, revision_of(connection)
+        return before, stored_revision(connection)
 
 
 @contextmanager
@@ -71,35 +79,34 @@ def derived_anew(connection: Connection) -> Iterator[None]:
         stood = connection.dialect.name == "postgresql" and take_down_wall(connection)
         dropped = drop_views(connection)
     yield
-    if revision_of(connection) == newest_revision():
+    if stored_revision(connection) == newest_revision():
         make_views(connection, dropped)
     _raise_wall_at_newest(connection, stood=stood)
 
 
 def _raise_wall_at_newest(connection: Connection, *, stood: bool = False) -> None:
-    if connection.dialect.name == "postgresql" and revision_of(connection) == newest_revision():
+    if connection.dialect.name == "postgresql" and stored_revision(connection) == newest_revision():
         raise_wall(connection, stood=stood)
 
 
 def is_up_to_date(database: Database) -> bool:
     """Whether an upgrade would change nothing: the newest revision, with the views of this program."""
     with database.engine.connect() as connection:
-        return revision_of(connection) == newest_revision() and views_are_current(connection)
-
-
-def revision_of(connection: Connection) -> str | None:
-    """The revision of a connection's database; None where it is empty."""
-    return MigrationContext.configure(connection).get_current_revision()
+        return stored_revision(connection) == newest_revision() and views_are_current(connection)
 
 
 def downgrade(database: Database, revision: str = "-1") -> None:
     """Undo migrations down to `revision`, which leaves no views (`refuse_without_views` says how far)."""
+    from alembic import command
+
     with migration_transaction(database) as connection, derived_anew(connection):
         command.downgrade(alembic_config(connection, database.secret_key), revision)
 
 
 def refuse_without_views(before: str | None, after: str | None) -> None:
     """Refuse a way down to a revision whose programs made their views by migrations, which are gone."""
+    from alembic.util import CommandError
+
     if before is not None and after is not None and after < before and after < FIRST_WITH_DERIVED_VIEWS:
         raise CommandError(
             f"programs of revision {after} need views that this program cannot create; use revision "
@@ -110,18 +117,27 @@ def refuse_without_views(before: str | None, after: str | None) -> None:
 def current_revision(database: Database) -> str | None:
     """The revision of the database; None where it is empty."""
     with database.engine.connect() as connection:
-        return revision_of(connection)
+        return stored_revision(connection)
+
+
+@cache
+def _known_revisions() -> tuple[frozenset[str], str]:
+    """Every revision of this program, and the newest, on which no other builds."""
+    files = (Path(migrations.__file__).parent / "versions").glob("*.py")
+    texts = [path.read_text(encoding="utf-8") for path in files]
+    known, built_on = (
+        {found for text in texts for found in re.findall(rf'^{name} = "(\w+)"', text, re.MULTILINE)}
+        for name in ("revision", "down_revision")
+    )
+    (newest,) = known - built_on
+    return frozenset(known), newest
 
 
 def newest_revision() -> str:
     """The revision this program expects."""
-    head = ScriptDirectory.from_config(alembic_config()).get_current_head()
-    if head is None:
-        raise RuntimeError("expected at least one migration in the folder migrations, found none")
-    return head
+    return _known_revisions()[1]
 
 
 def known_revision(revision: str) -> bool:
     """True where this program has that revision."""
-    scripts = ScriptDirectory.from_config(alembic_config())
-    return any(script.revision == revision for script in scripts.walk_revisions())
+    return revision in _known_revisions()[0]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from sqlalchemy import Connection, select, text
+from sqlalchemy import Connection, inspect, select, text
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import DeclarativeBase, Session
 
@@ -55,6 +55,14 @@ def newest_clip(session: Session) -> str | None:
 def run_called(session: Session, public_id: str) -> StudyRun | None:
     """The run with this public id, of whatever study and origin."""
     return session.scalar(select(StudyRun).where(StudyRun.public_id == public_id))
+
+
+def stored_revision(connection: Connection) -> str | None:
+    """The revision of a connection's database; None where it is empty."""
+    if not inspect(connection).has_table("alembic_version"):
+        return None
+    revision: str | None = connection.scalar(text("SELECT version_num FROM alembic_version"))
+    return revision
 
 
 def wait_for_other_migrations(connection: Connection) -> None:

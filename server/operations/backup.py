@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import IO
 
 import pyrage
-from alembic.runtime.migration import MigrationContext
 from pydantic import BaseModel, Field
 from pyrage import x25519
 from sqlalchemy import Connection, Table
@@ -23,6 +22,7 @@ from experiments.errors import InputError
 from experiments.files import check_targets, whole_private_file
 from server.core.db import Database
 from server.core.locks import file_lock
+from server.core.repository import stored_revision
 from server.core.settings import Settings
 from server.core.storage import ClipStore
 from server.core.values import iso, now
@@ -125,7 +125,7 @@ def write_backup(
 
 def _describe(connection: Connection, clips: ClipStore, folder: Path, with_clips: bool) -> Description:
     """Dump every table into `folder` and describe what was dumped."""
-    revision = MigrationContext.configure(connection).get_current_revision()  # the snapshot begins
+    revision = stored_revision(connection)  # the snapshot begins
     moment = iso(now())
     if revision is None:
         raise InputError("the database has no tables yet, so there is nothing to back up")

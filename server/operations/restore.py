@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, cast
 
-from alembic import command
 from pydantic import ValidationError
 from sqlalchemy import Connection, Table
 from sqlalchemy.exc import InterfaceError, OperationalError, StatementError
@@ -187,6 +186,8 @@ def _restore_rows(
     keys: _Keys,
     told: Callable[[str], None],
 ) -> None:
+    from alembic import command
+
     with database.write_connection() as connection:
         refuse_unless_empty(connection, "the database", ELSEWHERE)
         with derived_anew(connection):

@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import tomlkit
-
 from experiments import design
 from experiments.declaration.clip_rating import SCALE_NAME
 from experiments.declaration.experiment import Experiment
@@ -147,6 +145,8 @@ class StillPreparing(Conflict, code="still_preparing"):
 
 def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
     """A definition as TOML, to be edited further: one factor a column, random order, the template's trial."""
+    import tomlkit  # takes a twentieth of the time of a start
+
     check_factorial(placed)
     cells = {tuple(levels.values()) for levels, _ in placed.values()}
     document = tomlkit.document()

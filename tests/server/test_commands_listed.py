@@ -38,6 +38,14 @@ def test_help_lists_every_command_and_imports_none_of_their_libraries() -> None:
     assert "..." not in section  # every line whole
 
 
+def test_a_start_loads_no_library_of_rare_work() -> None:
+    """Migrations, edited definitions and sign-in by a provider: each takes a part of the time of a start."""
+    rare = ("alembic", "tomlkit", "authlib")
+    say = f"import sys, server.app, server.cli_run; print([n for n in {rare} if n in sys.modules])"
+    ended = subprocess.run([sys.executable, "-c", say], capture_output=True, text=True, check=True)
+    assert ended.stdout.strip() == "[]"
+
+
 @pytest.mark.parametrize("module", sorted({module for module, _ in COMMANDS.values()}))
 def test_every_line_of_help_is_the_one_of_the_command_itself(module: str) -> None:
     lines = {

@@ -3,12 +3,20 @@ import json
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, inspect, select, text
 
 from experiments.columns import Dialect
 from experiments.kinds import views
 from server.core.db import Database
-from server.core.migrate import current_revision, downgrade, newest_revision, upgrade
+from server.core.migrate import (
+    alembic_config,
+    current_revision,
+    downgrade,
+    known_revision,
+    newest_revision,
+    upgrade,
+)
 from server.models import Base, StudyVersion
 from tests.helpers.databases import BACKENDS
 from tests.helpers.older_databases import load_older_database
@@ -23,6 +31,13 @@ def test_the_migrations_make_what_the_models_declare(empty_database_url: str) ->
     with database.engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
     database.close()
+
+
+def test_the_newest_revision_read_from_the_files_is_that_of_alembic() -> None:
+    scripts = ScriptDirectory.from_config(alembic_config())
+    assert newest_revision() == scripts.get_current_head()
+    assert all(known_revision(script.revision) for script in scripts.walk_revisions())
+    assert not known_revision("9999")
 
 
 @both

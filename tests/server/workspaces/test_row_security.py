@@ -13,7 +13,8 @@ from server.context import Services
 from server.core import row_security
 from server.core import row_security as row_policies
 from server.core.db import Database
-from server.core.migrate import downgrade, newest_revision, revision_of, upgrade
+from server.core.migrate import downgrade, newest_revision, upgrade
+from server.core.repository import stored_revision
 from server.models import RIGHTS, Base, Study
 from tests.helpers.admins import Admin
 from tests.helpers.older_databases import load_older_database
@@ -217,7 +218,7 @@ def test_an_upgrade_that_cannot_put_the_wall_up_again_changes_nothing(empty_data
             upgrade(former)
         assert (policies(former), before > 10) == (before, True)
         with former.engine.connect() as connection:
-            assert revision_of(connection) == "0030"
+            assert stored_revision(connection) == "0030"
     finally:
         former.close()
         with owner.engine.begin() as connection:
