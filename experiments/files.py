@@ -4,6 +4,7 @@ import errno
 import json
 import math
 import os
+import shlex
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -63,6 +64,18 @@ def check_ending(path: Path | None, endings: tuple[str, ...], what: str) -> None
     """
     if path is not None and path.suffix.lower() not in endings:
         raise InputError(f"{what}: expected a name that ends in {' or '.join(endings)}, got '{path.name}'")
+
+
+def as_argument(path: Path | str) -> str:
+    """A file as it is written in a command for a shell; `./` before a name that would be read as an option.
+
+    Examples
+    --------
+    >>> as_argument("my ratings.csv"), as_argument("-1.csv")
+    ("'my ratings.csv'", './-1.csv')
+    """
+    name = str(path)
+    return shlex.quote(f".{os.sep}{name}" if name.startswith("-") else name)
 
 
 def remove_quietly(path: Path) -> None:

@@ -1,7 +1,6 @@
 """`analysis columns`, `convert` and `reshape`, and `page`: tables before and after an analysis."""
 
 import json as json_module
-import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -160,7 +159,7 @@ def page(
 
       analysis page ratings.csv results --roles roles.json
     """
-    from analysis.read.column_roles import options_of
+    from analysis.read.column_roles import options_of, shown_command
 
     asked = json_module.loads(roles.read_text(encoding="utf-8"))
     command, shown_name = asked["command"], asked.get("name", file.name)
@@ -170,5 +169,4 @@ def page(
     SHOWN.set(collected)
     program: Any = context.find_root().command
     program.main([command, str(file), *options, *more], standalone_mode=False)
-    line = shlex.join(["analysis", command, shown_name, *options, *more])
-    save_page(collected, folder, line)
+    save_page(collected, folder, shown_command(command, shown_name, [*options, *more]))

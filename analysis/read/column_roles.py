@@ -13,6 +13,7 @@ from analysis.read.number_columns import MISSING_MARKS, holds_numbers
 from analysis.read.text_table import EMPTY, read_text_table
 from analysis.read.wide import wide_hint
 from experiments.columns.column import OLD_ORDER
+from experiments.files import as_argument
 from table_files import InputError, counted
 
 MISSING = EMPTY | MISSING_MARKS
@@ -85,7 +86,12 @@ class TableGuess:
         # A guess may suit another analysis than this one.
         taken = [role for roles in OPTIONS[self.command] for role in roles]
         roles = {column.name: column.role for column in self.columns if column.role in taken}
-        return shlex.join(["analysis", self.command, file, *options_of(self.command, roles)])
+        return shown_command(self.command, file, options_of(self.command, roles))
+
+
+def shown_command(command: str, file: str, options: Sequence[str]) -> str:
+    """A command of `analysis` on a file, as it is typed in a shell."""
+    return f"analysis {command} {as_argument(file)} {shlex.join(options)}"
 
 
 # Which roles each command takes, by its options; those that must be given first.

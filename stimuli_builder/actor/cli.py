@@ -45,7 +45,7 @@ def actor(
 
       stimuli actor --seconds 120 --out actor.mp4 --labels labels.json --label-noise 1
     """
-    from experiments.files import check_targets
+    from experiments.files import as_argument, check_targets
     from stimuli_builder.actor.recording import Actor, ActorOptions, write_truth, write_video
     from stimuli_builder.progress import frame_progress
     from stimuli_builder.video import check_video_name
@@ -66,6 +66,8 @@ def actor(
         print(f"{truth}: truth of every frame")
     if labels is not None:
         _save_labels(person, labels, out.name, label_frames, label_noise)
+        track = f"stimuli track {as_argument(out)} --labels {as_argument(labels)} --out track.csv"
+        print(f"track it with: {track}")
 
 
 def _save_labels(person: "Actor", path: Path, video: str, count: int, noise: float) -> None:

@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -199,17 +200,23 @@ def _print_leaks(leaks: "Sequence[LevelLeak]") -> None:
 
 @contextmanager
 def progress_bar(what: str) -> "Iterator[Progress]":
-    """Show clips done and time left on stderr; nothing if stderr is not a terminal."""
+    """Show clips done and time left on stderr; a line per tenth of them if stderr is not a terminal."""
+    if not sys.stderr.isatty():
+        yield partial(_print_tenth, what)
+        return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn(what, markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    hidden = not sys.stderr.isatty()
-    with Progress(
-        *columns, console=Console(stderr=True, markup=False), disable=hidden, transient=True
-    ) as bar:
+    with Progress(*columns, console=Console(stderr=True, markup=False), transient=True) as bar:
         task = bar.add_task(what, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _print_tenth(what: str, done: int, total: int) -> None:
+    """For logs: one line whenever a further tenth of the clips is done, where there are ten or more."""
+    if total >= 10 and done and done * 10 // total > (done - 1) * 10 // total:
+        print(f"{what}: {done} of {total} clips", file=sys.stderr, flush=True)
 
 
 # `stimuli checks`: the clips of a study's motion checks.

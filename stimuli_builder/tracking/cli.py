@@ -294,7 +294,7 @@ def iris(
 
       stimuli iris face.mp4 track.csv --out iris.csv
     """
-    from experiments.files import check_ending, check_targets
+    from experiments.files import as_argument, check_ending, check_targets
     from stimuli_builder.progress import frame_progress
     from stimuli_builder.tracking.iris import IRIS_MM, write_irises
     from stimuli_builder.tracking.learn import open_video
@@ -310,7 +310,8 @@ def iris(
         print(
             f"median diameter {summary.diameter_px:.2f} px (middle half within {summary.spread_px:.2f} px): "
             f"{summary.mm_per_px:.4f} mm per pixel if an iris is {IRIS_MM:g} mm wide\n"
-            f"use it with: stimuli blinks {track} --scale {summary.mm_per_px:.4f}"
+            f"use it with: stimuli blinks {as_argument(track)} --scale {summary.mm_per_px:.4f} "
+            "--out blinks.csv"
         )
     else:
         print("too few irises to estimate the millimeters per pixel")

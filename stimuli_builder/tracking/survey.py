@@ -405,5 +405,5 @@ def _require_agreement(info: VideoInfo, detections: Sequence[Detection]) -> None
         return
     raise InputError(
         f"{info.path}: the detected face {told}; for a close-up of one eye add --one-eye; or label frames by "
-        "hand (--labels)"
+        "hand (--labels). Drawn faces always need labels: `stimuli actor --labels` writes them"
     )

@@ -1,9 +1,12 @@
 """Guesses of what columns are, on tables of strangers, and the options that roles become."""
 
+import shlex
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from analysis.cli import app
 from analysis.read.column_roles import TableGuess, guess_roles, options_of, said_of_values
 from experiments.errors import InputError
 
@@ -30,6 +33,18 @@ def test_pairs_are_recognized_by_their_columns(tmp_path: Path) -> None:
         "analysis pairs t.csv --left=condition_1 --right=condition_2 --winner=selection "
         "--participant=observer --by=scene"
     )
+
+
+@pytest.mark.parametrize("name", ["-1.csv", "my ratings.csv", "--help.csv"])
+def test_the_command_reads_a_file_of_any_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = [f"{n},{'ab'[k]},{400 + n * 7 % 5 + k * n % 3}" for n in range(8) for k in range(2)]
+    line = guess(tmp_path, _long("person,side,rating", rows)).command_line(name)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "table.csv").rename(tmp_path / name)
+    ended = CliRunner().invoke(app, shlex.split(line)[1:])
+    assert ended.exit_code == 0, f"{line}: {ended.output}"
 
 
 def test_groups_differ_from_factors_within(tmp_path: Path) -> None:

@@ -138,6 +138,7 @@ def test_command_writes_video_truth_and_labels(monkeypatch, capsys, tmp_path):
     with pytest.raises(SystemExit) as end:
         main()
     assert not end.value.code
+    assert f"track it with: stimuli track {video} --labels {labels} --out" in capsys.readouterr().out
     info = scan_video(video)
     assert (info.frame_count, info.size_px, info.variable) == (30, (512, 384), False)
     assert info.fps == pytest.approx(60)

@@ -7,7 +7,9 @@ import av
 import pytest
 from PIL import Image
 
+from experiments.load import load_experiment
 from stimuli_builder.cli import main
+from tests.helpers.tiny_clips import make_clip_folder
 
 from .conftest import Small
 
@@ -89,6 +91,16 @@ def test_build_with_preview(
     assert page.count("http") == 1
     assert stimuli(monkeypatch, "build", small.toml, "--out", out, "--quiet-when-current") == 0
     assert capsys.readouterr().out == ""
+
+
+def test_a_log_gets_a_line_per_tenth_of_the_clips(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """`make run` prints nothing else while clips are rendered, where its output is not a terminal."""
+    make_clip_folder(load_experiment("exp3"), tmp_path)
+    assert stimuli(monkeypatch, "siti", tmp_path) == 0
+    lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("measuring")]
+    assert lines == [f"measuring: {done} of 80 clips" for done in range(8, 81, 8)]
 
 
 def test_verify_says_what_it_measured(

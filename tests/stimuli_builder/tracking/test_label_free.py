@@ -261,6 +261,7 @@ def test_a_video_without_a_face_is_refused_in_one_line(detector, recording):
     with pytest.raises(InputError, match="add --one-eye; or label frames by hand") as refused:
         survey(scan_video(recording.video), one_eye=False)
     assert "\n" not in str(refused.value)
+    assert "`stimuli actor --labels`" in str(refused.value)
 
 
 def test_a_fit_where_the_detector_sees_nothing_is_doubtful_until_it_sees_the_eyes_again(lesson, recording):
