@@ -109,6 +109,31 @@ class Clip(Base):
     created_at: Mapped[datetime] = mapped_column(default=now)
 
 
+class BuilderDraft(Base):
+    """One tab in which somebody has the builder of a study open, and her unsaved work there.
+
+    Attributes
+    ----------
+    tab : str
+        A name that the page makes up.
+    seen_at : datetime
+        When the page was last heard of; soon after, it counts as closed.
+    draft : dict of str to Any or None
+        The unsaved work as the page writes it; None where there is none.
+    """
+
+    __tablename__ = "builder_drafts"
+
+    study_id: Mapped[int] = mapped_column(ForeignKey("studies.id", ondelete="CASCADE"), primary_key=True)
+    account_id: Mapped[int] = mapped_column(
+        ForeignKey("accounts.id", ondelete="CASCADE"), primary_key=True, index=True
+    )
+    tab: Mapped[str] = mapped_column(String(40), primary_key=True)
+    seen_at: Mapped[datetime] = mapped_column(default=now)
+    draft: Mapped[dict[str, Any] | None]
+    saved_at: Mapped[datetime | None]
+
+
 class VersionClip(Base):
     """A clip's place in a study version: its cell, levels and exemplar.
 

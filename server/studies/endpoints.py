@@ -32,6 +32,7 @@ from server.studies.links import (
 from server.studies.lookup import find_study
 from server.studies.schemas import (
     ArchiveStudy,
+    BuilderWork,
     ChangeSettings,
     ChangeStatus,
     ClipOut,
@@ -39,9 +40,11 @@ from server.studies.schemas import (
     Comparison,
     DefinitionCheck,
     DefinitionText,
+    DraftOut,
     EditDefinition,
     EditedDefinition,
     EditedVersion,
+    EditorOut,
     JudgedEdit,
     Label,
     LaunchCheck,
@@ -54,6 +57,7 @@ from server.studies.schemas import (
     ShippedExperiment,
     Signing,
     StudyDetail,
+    Tab,
 )
 from table_files.formulas import guarded_table
 
@@ -190,6 +194,37 @@ def compare_versions(
     """What differs between two versions: keys of the declaration, word by word, and clips."""
     with database.read() as session:
         return series.compare_versions(session, (other or study, old), (study, new), identity)
+
+
+# Unsaved work of the builder, and who has it open.
+
+
+@life_router.get("/drafts")
+def list_drafts(database: DatabaseDep, identity: Writer, study: str) -> list[DraftOut]:
+    """Your own unsaved work on this study, the latest first; it is shown to nobody else."""
+    with database.read() as session:
+        return service.own_drafts(session, study, identity)
+
+
+@life_router.put("/drafts/{tab}", status_code=204)
+def save_draft(database: DatabaseDep, identity: Writer, study: str, tab: Tab, body: BuilderWork) -> None:
+    """Keep the unsaved work of one tab."""
+    with database.write() as session:
+        service.save_draft(session, study, tab, body, identity)
+
+
+@life_router.delete("/drafts/{tab}", status_code=204)
+def discard_draft(database: DatabaseDep, identity: Writer, study: str, tab: Tab) -> None:
+    """Forget the unsaved work of one tab."""
+    with database.write() as session:
+        service.discard_draft(session, study, tab, identity)
+
+
+@life_router.post("/editors/{tab}")
+def list_editors(database: DatabaseDep, identity: Writer, study: str, tab: Tab) -> list[EditorOut]:
+    """Note that a tab has the builder open; who else has."""
+    with database.write() as session:
+        return service.other_editors(session, study, tab, identity)
 
 
 # Links on the dashboard.

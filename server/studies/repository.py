@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from sqlalchemy import ColumnElement, Select, case, func, insert, select
+from sqlalchemy import ColumnElement, Select, case, delete, func, insert, select
 from sqlalchemy.orm import Session, joinedload
 
 from experiments.checks import CHECK_CELL
-from server.models import Account, Clip, Link, Study, StudyRun, StudyVersion, VersionClip
+from server.models import Account, BuilderDraft, Clip, Link, Study, StudyRun, StudyVersion, VersionClip
 
 # Studies, their versions and clips, and how many runs each has.
 
@@ -207,6 +207,34 @@ def insert_version_clips(session: Session, version: StudyVersion, rows: Iterable
     values = [{"version_id": version.id, **row} for row in rows]
     session.execute(insert(VersionClip), values)
     session.expire(version, ["clips"])
+
+
+# The builder's open tabs and drafts.
+
+
+def builder_tab(session: Session, study: Study, account_id: int, tab: str) -> BuilderDraft | None:
+    """The row of one tab."""
+    return session.get(BuilderDraft, (study.id, account_id, tab))
+
+
+def drafts_of(session: Session, study: Study, account_id: int) -> list[BuilderDraft]:
+    """The drafts of one account, the latest first."""
+    mine = (BuilderDraft.study_id == study.id, BuilderDraft.account_id == account_id)
+    query = select(BuilderDraft).where(*mine, BuilderDraft.saved_at.is_not(None))
+    return list(session.scalars(query.order_by(BuilderDraft.saved_at.desc())))
+
+
+def tabs_open_since(session: Session, study: Study, since: datetime) -> list[tuple[BuilderDraft, str]]:
+    """The tabs heard of since then, each with the name of its account."""
+    query = select(BuilderDraft, Account.name).join(Account, Account.id == BuilderDraft.account_id)
+    query = query.where(BuilderDraft.study_id == study.id, BuilderDraft.seen_at >= since)
+    return [(row, name) for row, name in session.execute(query.order_by(Account.name, BuilderDraft.tab))]
+
+
+def delete_closed_tabs(session: Session, study: Study, before: datetime) -> None:
+    """Forget tabs that were closed before then and left no draft."""
+    closed = (BuilderDraft.study_id == study.id, BuilderDraft.seen_at < before)
+    session.execute(delete(BuilderDraft).where(*closed, BuilderDraft.saved_at.is_(None)))
 
 
 # Links into studies, and how many runs each has.

@@ -113,6 +113,7 @@ class EditedDefinition(BaseModel):
     """A definition as text and as data, with its problems, or what it expands to."""
 
     toml: str
+    comments: list[str] = Field(description="Comments in the text, from top to bottom.")
     data: dict[str, Any] | None = Field(description="Null where the text is not TOML.")
     problems: list[ProblemOut]
     design: DesignOut | None
@@ -282,6 +283,39 @@ class NewVersion(EditedVersion):
     levels: LevelsTable | LevelsPattern | None = Field(
         default=None, description="Cells of the uploaded clips; not needed with `places`."
     )
+
+
+# What the endpoints of the builder's drafts take and give.
+
+Tab = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9-]{1,40}$")]
+
+
+class BuilderWork(RequestBody):
+    """Unsaved work of the builder."""
+
+    toml: TomlText
+    data: dict[str, Any] | None = Field(description="What the text shall say, if it does not yet.")
+    revision: Revision
+    base: TomlText | None = Field(description="The stored text that the work began from.")
+    places: Annotated[list[dict[str, Any]], Field(max_length=5000)] | None = Field(
+        description="Clips in other cells than stored."
+    )
+
+
+class DraftOut(BaseModel):
+    """Unsaved work, and when it was kept."""
+
+    tab: str
+    at: datetime
+    work: BuilderWork
+
+
+class EditorOut(BaseModel):
+    """Somebody else who has the builder of the study open, or oneself in another tab."""
+
+    name: str
+    own: bool
+    edits: bool = Field(description="There is unsaved work.")
 
 
 class ChangeStatus(RequestBody):

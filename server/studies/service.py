@@ -23,7 +23,7 @@ from server.core.db import Database
 from server.core.errors import Conflict, Invalid
 from server.core.storage import clip_address
 from server.core.values import now
-from server.models import Study, StudyVersion, VersionClip
+from server.models import BuilderDraft, Study, StudyVersion, VersionClip
 from server.participation.recruiter import Recruiter, without_refused
 from server.studies import repository
 from server.studies.creation import add_version, create_study, for_edit, planned_experiment, size_notes
@@ -45,15 +45,18 @@ from server.studies.lookup import (
 from server.studies.schemas import (
     ArchiveStudy,
     BlockOut,
+    BuilderWork,
     ChangeSettings,
     ChangeStatus,
     ClipOut,
     CloneStudy,
     DefinitionCheck,
     DesignOut,
+    DraftOut,
     EditDefinition,
     EditedDefinition,
     EditedVersion,
+    EditorOut,
     FactorOut,
     JudgedEdit,
     LaunchCheck,
@@ -114,7 +117,8 @@ def check_definition(text: str) -> DefinitionCheck:
 
 def edit_definition(edited: EditDefinition) -> EditedDefinition:
     """A definition's text with other data in it: what did not change keeps its form and its comments."""
-    from server.studies.toml_edit import with_data  # its tomlkit takes a twentieth of the time of a start
+    # Not above: its tomlkit takes a twentieth of the time of a start.
+    from server.studies.toml_edit import comments_of, with_data
 
     text = edited.toml if edited.data is None else with_data(edited.toml, edited.data)
     try:
@@ -122,7 +126,10 @@ def edit_definition(edited: EditDefinition) -> EditedDefinition:
     except DefinitionError:
         data = None
     checked = check_definition(text)
-    return EditedDefinition(toml=text, data=data, problems=checked.problems, design=checked.design)
+    comments = [] if data is None else comments_of(text)
+    return EditedDefinition(
+        toml=text, comments=comments, data=data, problems=checked.problems, design=checked.design
+    )
 
 
 def judge_edit(session: Session, name: str, edit: EditedVersion, identity: Identity) -> JudgedEdit:
@@ -325,6 +332,67 @@ def _clip_out(row: VersionClip, told: dict[str, Any]) -> ClipOut:
         closure=told.get("closure", []),
         source=(source := told.get("source")) and source | {"frame_map": ()},
     )
+
+
+# Unsaved work of the builder: kept per person and tab, and shown to nobody else.
+
+OPEN_FOR = timedelta(seconds=45)
+"""After this without a sign of life a tab counts as closed; pages send one every 15 s."""
+MAX_DRAFTS = 10
+"""Drafts of one person on one study; the oldest go."""
+
+
+def _own_tab(session: Session, study: Study, identity: Identity, tab: str) -> BuilderDraft:
+    row = repository.builder_tab(session, study, identity.account_id, tab)
+    if row is None:
+        row = BuilderDraft(study_id=study.id, account_id=identity.account_id, tab=tab)
+        session.add(row)
+    row.seen_at = now()
+    return row
+
+
+def other_editors(session: Session, name: str, tab: str, identity: Identity) -> list[EditorOut]:
+    """Note that this tab has the builder open; the other tabs that have."""
+    study = find_study(session, name, identity, "edit")
+    _own_tab(session, study, identity, tab)
+    session.flush()
+    since = now() - OPEN_FOR
+    repository.delete_closed_tabs(session, study, since)
+    others: dict[str, EditorOut] = {}
+    for row, account in repository.tabs_open_since(session, study, since):
+        if (row.account_id, row.tab) == (identity.account_id, tab):
+            continue
+        edits = row.saved_at is not None or (account in others and others[account].edits)
+        others[account] = EditorOut(name=account, edits=edits, own=row.account_id == identity.account_id)
+    return list(others.values())
+
+
+def save_draft(session: Session, name: str, tab: str, draft: BuilderWork, identity: Identity) -> None:
+    """Keep the unsaved work of a tab in the place of what it kept before."""
+    study = find_study(session, name, identity, "edit")
+    row = _own_tab(session, study, identity, tab)
+    row.draft, row.saved_at = draft.model_dump(mode="json"), now()
+    session.flush()
+    for old in repository.drafts_of(session, study, identity.account_id)[MAX_DRAFTS:]:
+        session.delete(old)
+
+
+def own_drafts(session: Session, name: str, identity: Identity) -> list[DraftOut]:
+    """The unsaved work of this person on a study, the latest first."""
+    study = find_study(session, name, identity, "edit")
+    return [
+        DraftOut(tab=row.tab, at=row.saved_at, work=BuilderWork.model_validate(row.draft))
+        for row in repository.drafts_of(session, study, identity.account_id)
+        if row.saved_at is not None
+    ]
+
+
+def discard_draft(session: Session, name: str, tab: str, identity: Identity) -> None:
+    """Forget the unsaved work of a tab; nothing where there is none."""
+    study = find_study(session, name, identity, "edit")
+    row = repository.builder_tab(session, study, identity.account_id, tab)
+    if row is not None:
+        row.draft = row.saved_at = None
 
 
 # A study copied, put into the archive and taken out.

@@ -5,6 +5,7 @@ comments go with the element below them.
 """
 
 import json
+import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -382,3 +383,22 @@ def _merge_array(array: Array, edited: list[Any]) -> None:
             array.insert(index, inline_item(value))
         elif not _is_same(_plain_value(array[index]), value):
             array[index] = inline_item(value)
+
+
+# Comments, to see which of two texts has any that the other lacks.
+
+_STRING_OR_COMMENT = re.compile(
+    r'"""(?:\\.|[^\\])*?"""|\'\'\'.*?\'\'\'|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|(#[^\n]*)', re.DOTALL
+)
+"""Strings are skipped: their # begins no comment. Unlike tomlkit it takes long texts in linear time."""
+
+
+def comments_of(text: str) -> list[str]:
+    """The comments of a valid TOML text, from top to bottom.
+
+    Examples
+    --------
+    >>> comments_of('# a study\\nname = "x" # short\\ntitle = "# no comment"')
+    ['# a study', '# short']
+    """
+    return [comment.rstrip() for comment in _STRING_OR_COMMENT.findall(text) if comment]

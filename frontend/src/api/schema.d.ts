@@ -418,6 +418,22 @@ export interface paths {
   };
   get: operations["compare_versions"];
  };
+ "/api/admin/studies/{study}/drafts": {
+  parameters: {
+  };
+  get: operations["list_drafts"];
+ };
+ "/api/admin/studies/{study}/drafts/{tab}": {
+  parameters: {
+  };
+  put: operations["save_draft"];
+  delete: operations["discard_draft"];
+ };
+ "/api/admin/studies/{study}/editors/{tab}": {
+  parameters: {
+  };
+  post: operations["list_editors"];
+ };
  "/api/admin/studies/{study}/links": {
   parameters: {
   };
@@ -810,6 +826,17 @@ export interface components {
   Body_upload_more: {
    files?: string[] | null;
    replaces?: string | null;
+  };
+  BuilderWork: {
+   toml: string;
+   data: {
+    [key: string]: unknown;
+   } | null;
+   revision: number;
+   base: string | null;
+   places: {
+    [key: string]: unknown;
+   }[] | null;
   };
   CalibrationResult: {
    px_per_mm: number;
@@ -1244,6 +1271,12 @@ export interface components {
    scale_reloaded: "ignore" | "flag" | "repeat";
    focus_lost: ("ignore" | "flag" | "repeat") | null;
   };
+  DraftOut: {
+   tab: string;
+   /** Format: date-time */
+   at: string;
+   work: components["schemas"]["BuilderWork"];
+  };
   DrillResult: {
    /** Format: date-time */
    at: string;
@@ -1284,6 +1317,7 @@ export interface components {
   };
   EditedDefinition: {
    toml: string;
+   comments: string[];
    data: {
     [key: string]: unknown;
    } | null;
@@ -1293,6 +1327,11 @@ export interface components {
   EditedVersion: {
    toml: string;
    places?: components["schemas"]["PlacedClip"][] | null;
+  };
+  EditorOut: {
+   name: string;
+   own: boolean;
+   edits: boolean;
   };
   Elsewhere: {
    url: string;
@@ -3921,6 +3960,7 @@ export type Blocks = components['schemas']['Blocks'];
 export type BodyEndByProvider = components['schemas']['Body_end_by_provider'];
 export type BodyUploadClips = components['schemas']['Body_upload_clips'];
 export type BodyUploadMore = components['schemas']['Body_upload_more'];
+export type BuilderWork = components['schemas']['BuilderWork'];
 export type CalibrationResult = components['schemas']['CalibrationResult'];
 export type CalibrationState = components['schemas']['CalibrationState'];
 export type CapsuleOut = components['schemas']['CapsuleOut'];
@@ -3963,12 +4003,14 @@ export type DefinitionText = components['schemas']['DefinitionText'];
 export type DesignOut = components['schemas']['DesignOut'];
 export type Display = components['schemas']['Display'];
 export type Disturbances = components['schemas']['Disturbances'];
+export type DraftOut = components['schemas']['DraftOut'];
 export type DrillResult = components['schemas']['DrillResult'];
 export type DropFailedPlays = components['schemas']['DropFailedPlays'];
 export type DropSlowTrials = components['schemas']['DropSlowTrials'];
 export type EditDefinition = components['schemas']['EditDefinition'];
 export type EditedDefinition = components['schemas']['EditedDefinition'];
 export type EditedVersion = components['schemas']['EditedVersion'];
+export type EditorOut = components['schemas']['EditorOut'];
 export type Elsewhere = components['schemas']['Elsewhere'];
 export type Erase = components['schemas']['Erase'];
 export type Erased = components['schemas']['Erased'];
@@ -7391,6 +7433,140 @@ export interface operations {
     };
     content: {
      "application/json": components["schemas"]["Comparison"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ list_drafts: {
+  parameters: {
+   path: {
+    study: string;
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["DraftOut"][];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ save_draft: {
+  parameters: {
+   path: {
+    study: string;
+    tab: string;
+   };
+  };
+  requestBody: {
+   content: {
+    "application/json": components["schemas"]["BuilderWork"];
+   };
+  };
+  responses: {
+   204: {
+    headers: {
+     [name: string]: unknown;
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ discard_draft: {
+  parameters: {
+   path: {
+    study: string;
+    tab: string;
+   };
+  };
+  responses: {
+   204: {
+    headers: {
+     [name: string]: unknown;
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ list_editors: {
+  parameters: {
+   path: {
+    study: string;
+    tab: string;
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["EditorOut"][];
     };
    };
    422: {

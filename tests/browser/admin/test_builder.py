@@ -25,7 +25,7 @@ def opened(dashboard: Dashboard, section: str) -> Page:
 
 
 def text_of(page: Page) -> str:
-    expect(page.get_by_text("Not saved; your work is in this browser only.")).to_be_visible()
+    expect(page.get_by_text("Not saved; your work is in this browser.")).to_be_visible()
     return str(page.get_by_label("Definition", exact=True).input_value())
 
 
@@ -81,7 +81,7 @@ def test_steps_are_undone_and_done_again(dashboard: Dashboard) -> None:
 def test_work_is_kept_over_a_reload_and_a_lost_sign_in(dashboard: Dashboard) -> None:
     page = opened(dashboard, "texts")
     page.get_by_label("Debrief (Markdown)").fill("Kept words.")
-    expect(page.get_by_text("Not saved; your work is in this browser only.")).to_be_visible()
+    expect(page.get_by_text("Not saved; your work is in this browser.")).to_be_visible()
     page.get_by_role("tab", name="Clips").click()
     # A way back before the other tab is shown leaves the builder where it is: nothing is to be brought back.
     page.get_by_role("button", name="Save as a new version").wait_for(state="detached")

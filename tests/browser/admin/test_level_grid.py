@@ -28,7 +28,7 @@ def made_study(dashboard: Dashboard, name: str) -> None:
     with zipfile.ZipFile(packed, "w") as archive:
         for number, file in enumerate(("slow_1.mp4", "slow_2.mp4", "fast_1.mp4", "fast_2.mp4")):
             archive.writestr(file, encoded_video(8, 30) + bytes([0, 0, 0, 9]) + b"free" + bytes([number]))
-    files = {"name": "clips.zip", "mimeType": "application/zip", "buffer": packed.getvalue()}
+    files: Any = {"name": "clips.zip", "mimeType": "application/zip", "buffer": packed.getvalue()}
     upload = requests.post(f"{api}/uploads", multipart={"files": files}, headers=SAME_ORIGIN).json()["id"]
     while requests.get(f"{api}/uploads/{upload}/progress").json()["waiting"]:
         time.sleep(0.1)  # the clips are looked into by another process

@@ -33,7 +33,7 @@ def builder(page: Page, dashboard: Dashboard, section: str = "texts") -> Page:
 
 def typed(page: Page, words: str) -> None:
     page.get_by_label(DEBRIEF).fill(words)
-    expect(page.get_by_text("Not saved; your work is in this browser only.")).to_be_visible()
+    expect(page.get_by_text("Not saved; your work is in this browser.")).to_be_visible()
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from experiments.errors import InputError
 from experiments.load import SHIPPED, DefinitionError, locate, parse_experiment
-from server.studies.toml_edit import with_data
+from server.studies.toml_edit import comments_of, with_data
 
 EXP3 = locate("exp3").read_text(encoding="utf-8")
 NAMES = st.sampled_from(["name", "value", "rule", "label", "en", "de", "x"])
@@ -175,3 +175,13 @@ def test_a_text_that_keeps_the_editor_busy_is_refused_before_it_is_read(text: st
     """tomlkit makes an object of each line: 4 s for half a million empty ones, while others wait."""
     with pytest.raises(InputError, match="edit such a text manually"):
         with_data(text, {"a": 1})
+
+
+def test_comments_are_found_and_what_only_looks_like_one_is_not() -> None:
+    text = (
+        '# first\nname = "x" # short\ntitle = "# \\" # no"\nlist = [ # in\n1]\n# it\'s\n[a] #z\nb = \'# no\'\n'
+        '[[c]] # table\nd = """\n# no \\""" # no\n"""\ne = \'\'\'\n# no\'\'\' # yes\n'
+    )
+    tomllib.loads(text)
+    expected = ["# first", "# short", "# in", "# it's", "#z", "# table", "# yes"]
+    assert comments_of(text) == expected

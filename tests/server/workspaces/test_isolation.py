@@ -83,7 +83,17 @@ NEEDED: dict[Right, set[str]] = {
         "POST capsules",
         "DELETE capsules/{capsule}",
     },
-    "edit": {"DELETE ", "POST versions", "POST runs/{run}/erase", "POST copies", "POST seal"},
+    "edit": {
+        "DELETE ",
+        "POST versions",
+        "POST runs/{run}/erase",
+        "POST copies",
+        "POST seal",
+        "GET drafts",
+        "PUT drafts/{tab}",
+        "DELETE drafts/{tab}",
+        "POST editors/{tab}",
+    },
     "export": {
         "GET runs",
         "GET runs/{run}",
@@ -163,7 +173,7 @@ def foreign(client: TestClient, services: Services, study: StudyInDatabase) -> L
         "session_id": str(owner.get("/sessions").json()[0]["id"]), "token_id": str(token),
         "invitation_id": str(invitation), "table": "ratings", "ending": "sav", "language": "R",
         "upload": upload, "capsule": "d" * 32, "sha256": "c" * 64,
-        "provider": "uni", "login_id": str(login), "trial_index": "0", "rehearsal": "b" * 32,
+        "provider": "uni", "login_id": str(login), "trial_index": "0", "rehearsal": "b" * 32, "tab": "tab-1",
     }  # fmt: skip
     title = study.experiment.title
     return Laboratory(

@@ -206,14 +206,14 @@ def test_an_upgrade_that_cannot_put_the_wall_up_again_changes_nothing(empty_data
     )
     try:
         upgrade(former)
-        before = policies(former)
         with owner.engine.begin() as connection:
-            connection.exec_driver_sql("DROP TABLE shared_counts")
+            connection.exec_driver_sql("DROP TABLE shared_counts, builder_drafts")
             connection.exec_driver_sql("DROP INDEX ix_assigned_trials_not_main")
             connection.exec_driver_sql("ALTER TABLE study_runs DROP COLUMN recruiter")
             connection.exec_driver_sql("UPDATE alembic_version SET version_num = '0030'")
             # What this user may take down it may not put up again.
             connection.exec_driver_sql("REVOKE USAGE ON LANGUAGE sql FROM PUBLIC")
+        before = policies(former)
         with pytest.raises(InputError, match="earlier version: permission denied for language"):
             upgrade(former)
         assert (policies(former), before > 10) == (before, True)

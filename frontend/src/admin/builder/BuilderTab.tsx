@@ -8,10 +8,13 @@ import { Answer, onDemand } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { when } from "../ui/format";
 import { isTable } from "./data";
-import { type Meeting, meetingOf } from "./history";
+import { isSame, type Meeting, meetingOf } from "./history";
 import { type Draft, forgetDraft, forgetWork, type Kept, keptWork, otherWork } from "./kept";
 
 const Workbench = onDemand(async () => (await import("./Workbench")).Workbench);
+const OfferedDrafts = onDemand(async () => (await import("./Drafts")).OfferedDrafts, null);
+const OtherEditors = onDemand(async () => (await import("./Drafts")).OtherEditors, null);
+const Difference = onDemand(async () => (await import("./Drafts")).Difference, null);
 
 export function BuilderTab() {
   const { study = "" } = useParams({ strict: false });
@@ -41,8 +44,12 @@ async function broughtTogether({ toml, data, base, places }: Kept, present: stri
     read({ toml: present, data: null }),
   ]);
   if (!isTable(mine.data) || !isTable(theirs.data)) return { toml: mine.toml, data: mine.data, places, meeting: null };
-  const meeting = meetingOf(before.data, mine.data, theirs.data);
-  const merged = await read({ toml: present, data: meeting.merged });
+  // The merged data are written into the text whose comments were edited; where both were, into theirs.
+  const [old, my, their] = [before, mine, theirs].map(({ comments }) => comments);
+  const intoMine = isSame(old, their);
+  const lost = intoMine || isSame(old, my) ? [] : (my ?? []).filter((comment) => !old?.includes(comment) && !their?.includes(comment));
+  const meeting = { ...meetingOf(before.data, mine.data, theirs.data), lostComments: lost };
+  const merged = await read({ toml: intoMine ? mine.toml : present, data: meeting.merged });
   return { toml: merged.toml, data: merged.data, places, meeting };
 }
 
@@ -51,8 +58,9 @@ const isWork = ({ toml, data, places }: Kept, detail: Schemas["StudyDetail"]) =>
 
 /** Begins with work kept in this browser, where there is some, else with what is stored. */
 function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
-  const { name, revision } = detail.summary;
-  const [kept] = useState(() => {
+  const { name, revision, rights } = detail.summary;
+  const mayEdit = rights.includes("edit");
+  const [kept, setKept] = useState<Kept | null>(() => {
     const work = keptWork(name);
     return work !== null && isWork(work, detail) ? work : null;
   });
@@ -73,9 +81,11 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   const without = (draft: Draft) => setOthers((before) => before.filter((one) => one.key !== draft.key));
   // What it replaces in this tab is asked for first; the other tab's draft stays where it is.
   const open = (draft: Draft) => {
-    if (keptWork(name) !== null && !window.confirm("Replace the unsaved work in this tab?")) return;
+    if (keptWork(name) !== null && !window.confirm("Replace the unsaved work in this tab?")) return false;
     without(draft);
+    setKept(draft);
     setFrom({ toml: draft.toml, data: draft.data, places: draft.places });
+    return true;
   };
   const discard = (draft: Draft) => {
     forgetDraft(draft.key);
@@ -120,8 +130,11 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
                 confirm="Discard the work"
                 onConfirm={() => discard(draft)}
               />
+              <Difference detail={detail} draft={draft} />
             </Group>
           ))}
+          {mayEdit && <OfferedDrafts detail={detail} onOpen={open} />}
+          {mayEdit && <OtherEditors study={name} />}
           <Workbench
             detail={detail}
             meeting={begun.meeting}

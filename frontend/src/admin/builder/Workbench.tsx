@@ -23,6 +23,7 @@ import { EXPERIMENT, sectionOf, SECTIONS } from "./schema";
 import { TrialPreview } from "./TrialPreview";
 import { type Builder, BuilderContext, useBuilder, useBuilderHere } from "./useBuilder";
 
+const SentDraft = onDemand(async () => (await import("./Drafts")).SentDraft, null);
 const LevelGrid = onDemand(async () => (await import("./LevelGrid")).LevelGrid);
 
 // What saving an edited definition would do to the answers that are there: said before it is saved.
@@ -151,7 +152,7 @@ export function Workbench({ detail, start, meeting }: Props) {
 }
 
 /** What somebody else changed meanwhile, and for each field that both changed, whose words stay. */
-function Met({ meeting: { both, theirs }, version }: { meeting: Meeting; version: number }) {
+function Met({ meeting: { both, theirs, lostComments = [] }, version }: { meeting: Meeting; version: number }) {
   const builder = useBuilderHere();
   const [taken, setTaken] = useState<readonly string[]>([]);
   const choose = ({ path, mine, theirs: other }: MeetingEdit, whose: string) => {
@@ -172,6 +173,11 @@ function Met({ meeting: { both, theirs }, version }: { meeting: Meeting; version
             ))}
           </List>
         </>
+      )}
+      {lostComments.length > 0 && (
+        <Text size="sm" className="wrap-anywhere">
+          You both changed comments in the TOML. These of yours are not in the merged text: {lostComments.join(" ")}
+        </Text>
       )}
       {both.length > 0 && <Text size="sm">You both changed {counted(both.length, "field")}. Choose what stays:</Text>}
       {both.map((edit) => (
@@ -351,8 +357,9 @@ function Bar({ detail, builder, withToml, onWithToml }: BarProps) {
         {builder.error !== null
           ? `${builder.error.message} Your work is still in this browser.`
           : builder.changed
-            ? "Not saved; your work is in this browser only."
+            ? "Not saved; your work is in this browser."
             : `Saved as version ${detail.summary.version}.`}
+        {detail.summary.rights.includes("edit") && <SentDraft detail={detail} builder={builder} />}
         {builder.empty.length > 0 && ` Clips are missing: ${namesOf(builder.empty)}.`}
         {status === "live" && " This study is live: saving creates a new version. Runs in progress keep theirs."}
       </Text>

@@ -108,6 +108,8 @@ export interface Meeting {
   mine: readonly Change[];
   /** What both changed, each in another way: mine for now. */
   both: readonly MeetingEdit[];
+  /** Comments of mine in the TOML that the merged text lacks, as both changed comments. */
+  lostComments?: readonly string[];
 }
 
 /** Edits that began from `base`, brought together. */
@@ -179,7 +181,7 @@ const nameOf = (element: unknown) => textAt(element, ["name"]) || textAt(element
 const elementOf = (list: unknown, named: string) =>
   Array.isArray(list) ? (list as unknown[]).find((one) => nameOf(one) === named) : undefined;
 
-function isSame(one: unknown, other: unknown): boolean {
+export function isSame(one: unknown, other: unknown): boolean {
   if (one === other) return true;
   if (Array.isArray(one) && Array.isArray(other))
     return one.length === other.length && (one as unknown[]).every((value, index) => isSame(value, (other as unknown[])[index]));

@@ -29,7 +29,8 @@ const TAB = "palpebra-builder-tab";
 const prefix = (study: string) => `palpebra-builder:${study}`;
 const key = (study: string) => `${prefix(study)}:${tab}`;
 
-const tab = thisTab();
+/** This tab's name, here and on the server. */
+export const tab = thisTab();
 
 /**
  * A name for this tab that survives a reload. It is in the tab's store only while no page has it: a duplicated tab copies
@@ -59,7 +60,7 @@ function taken(): string | null {
 }
 
 /** Stored work as it was kept; null where it is anything else. */
-function keptFrom(stored: unknown): Kept | null {
+export function keptFrom(stored: unknown): Kept | null {
   if (typeof stored !== "object" || stored === null) return null;
   const { toml, data, revision, base, at, places } = stored as Partial<Kept>;
   if (typeof toml !== "string" || typeof revision !== "number" || typeof at !== "string") return null;

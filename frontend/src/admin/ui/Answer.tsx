@@ -98,12 +98,15 @@ export function NotFound() {
 
 // Parts of a page whose code loads when they are first shown: charts, the builder's forms.
 
-/** `load`'s component; a loader takes its place until its code is here. */
-export function onDemand<Props extends object>(load: () => Promise<ComponentType<Props>>): ComponentType<Props> {
+/** `load`'s component; a loader, or `meanwhile`, takes its place until its code is here. */
+export function onDemand<Props extends object>(
+  load: () => Promise<ComponentType<Props>>,
+  meanwhile: ReactNode = <Waiting />,
+): ComponentType<Props> {
   const Loaded = lazy(async () => ({ default: await load() }));
   return function OnDemand(props: Props) {
     return (
-      <Suspense fallback={<Waiting />}>
+      <Suspense fallback={meanwhile}>
         <Loaded {...props} />
       </Suspense>
     );
