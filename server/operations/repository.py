@@ -140,7 +140,10 @@ def owner_addresses(session: Session, study: Study) -> list[str]:
     return sorted({str(address) for address in session.scalars(query)})
 
 
-def events_recorded(session: Session, action: str, study: str) -> set[str]:
-    """The events that audit entries of this action name."""
+def ways_recorded(session: Session, action: str, study: str) -> dict[str, set[str]]:
+    """By which ways the events arrived that audit entries of this action name."""
     query = select(AuditEntry.details).where(AuditEntry.action == action, AuditEntry.target == study)
-    return {str(details.get("event")) for details in session.scalars(query)}
+    ways: dict[str, set[str]] = {}
+    for details in session.scalars(query):
+        ways.setdefault(str(details.get("event")), set()).update(details.get("by", ()))
+    return ways

@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from contextlib import AbstractAsyncContextManager, suppress
 from datetime import timedelta
 from typing import Any, Literal, NamedTuple
@@ -195,16 +195,17 @@ def look_at_studies(server: WatchedServer, stopped: Stopped = lambda: False) -> 
 def _send_new(server: WatchedServer, name: str, findings: Sequence[Finding]) -> None:
     with server.database.read() as session:
         study = find_study(session, name, OPERATOR, "view")
-        known = repository.events_recorded(session, _ACTION, name)
-        new = [one for one in study_warnings(session, study, findings) if _key(study, one) not in known]
+        arrived = repository.ways_recorded(session, _ACTION, name)
+        warnings = list(study_warnings(session, study, findings))
         title, addresses = study.title, repository.owner_addresses(session, study)
-        keys = {one.event: _key(study, one) for one in new}
-    for warning in new:
-        by = _send(server.settings, name, title, warning, addresses)
-        if not by:  # nobody knows of it yet: the next look tries again
+        keys = {one.event: _key(study, one) for one in warnings}
+    for warning in warnings:
+        event = keys[warning.event]
+        by = _send(server.settings, name, title, warning, addresses, arrived.get(event, set()))
+        if not by:  # known already, or no way works: the next look tries again
             continue
         with server.database.write() as session:
-            record(session, OPERATOR, _ACTION, "study", name, event=keys[warning.event], by=by)
+            record(session, OPERATOR, _ACTION, "study", name, event=event, by=by)
 
 
 def _key(study: Study, warning: StudyWarning) -> str:
@@ -213,19 +214,24 @@ def _key(study: Study, warning: StudyWarning) -> str:
 
 
 def _send(
-    settings: Settings, name: str, title: str, warning: StudyWarning, addresses: Sequence[str]
+    settings: Settings,
+    name: str,
+    title: str,
+    warning: StudyWarning,
+    addresses: Sequence[str],
+    arrived: Set[str],
 ) -> list[str]:
-    """By which ways it arrived: of several, one that fails keeps none of the others from it."""
+    """By which ways it arrived now, and not before: one that fails keeps none of the others from it."""
     link = f"{settings.public_url}/admin/studies/{name}/{warning.page}".removesuffix("/server")
     text = (
         f"{warning.text}\n\n{link}\n\nYou receive this email because you own the study '{title}'. "
         "Each event is sent once.\n"
     )
     by = []
-    if can_send(settings):
+    if can_send(settings) and "mail" not in arrived:
         sent = [send_mail(settings, one, f"Palpebra: {title}", text) for one in addresses]
         by += ["mail"] if any(sent) else []
-    if settings.webhook_url:
+    if settings.webhook_url and "webhook" not in arrived:
         content = {"study": name, "title": title, "kind": warning.kind, "text": warning.text, "link": link}
         by += ["webhook"] if _call_webhook(settings.webhook_url, content) else []
     return by

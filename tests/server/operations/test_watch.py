@@ -218,6 +218,7 @@ def test_mail_that_is_refused_keeps_no_webhook_from_a_warning(
 ) -> None:
     own(services)
     monkeypatch.setattr("server.operations.doctor.LEAST_FREE_BYTES", 1 << 60)
+    port = services.settings.smtp_port
     monkeypatch.setattr(services.settings, "smtp_port", 9)
     with caplog.at_level(logging.ERROR):
         look(services)
@@ -225,3 +226,7 @@ def test_mail_that_is_refused_keeps_no_webhook_from_a_warning(
     assert [one["kind"] for one in hook.taken] == ["server"]
     [entry] = [one for one in owner.get("/audit").json() if one["action"] == "warning sent"]
     assert entry["details"]["by"] == ["webhook"]
+    monkeypatch.setattr(services.settings, "smtp_port", port)
+    for _ in range(2):
+        look(services)
+    assert (len(box.letters), len(hook.taken)) == (1, 1)
