@@ -10,12 +10,15 @@ from scipy.interpolate import RBFInterpolator
 
 from face_baking.identity import Movement
 from face_baking.kit import Array, FaceKit, Index
-from face_baking.lid_loops import SIDES, chains, globe_of, lid_loops
+from face_baking.lid_loops import EDGE_LOOP, SIDES, chains, globe_of, lid_loops, with_longer_corner
 from face_baking.lower_lid import lower_lid_weight, moved_lower_lid, turned_about
-from face_baking.sphere import cartesian, slerp, spherical, surface_radius
+from face_baking.sphere import IRIS_CM, cartesian, slerp, spherical, surface_radius
 from stimuli_builder.characters.colour import smooth
 
 CAMERA_Z_CM = 74.0
+IRIS_COVERED_CM, IRIS_COVERED_BELOW_CM = 0.25, 0.01
+"""How far the resting lids' wet edges reach over the iris; 0.7 mm less of it is seen covered (see
+docs/explanation/face-quality.md), since an iris fades into the white at its rim and a lid is thick."""
 SIDE_TAGS = {1: "L", -1: "R"}
 # Gap between the shut edges, least distances of the loops from the eye, and the softness of the lift, cm.
 _OVERLAP_CM, _CLEARANCE_CM, _SOFT_CM = -0.004, (0.005, 0.035, 0.075), 0.012
@@ -47,10 +50,15 @@ class BlinkPath:
     """
 
     def __init__(self, kit: FaceKit, rest: Array, movement: Movement) -> None:
-        self.kit, self.rest, self.movement = kit, rest, movement
+        self.kit, self.movement = kit, movement
         self.look, self.expression = (0.0, 0.0), np.zeros((1, 3))
         self.globes = {side: globe_of(kit, rest, side) for side in SIDES}
         self.loops = {side: lid_loops(kit, side) for side in SIDES}
+        self.rest = rest.copy()
+        for side in SIDES:
+            self.rest = with_longer_corner(kit, self.rest, self.loops[side], self.globes[side], side)
+        for side in SIDES:
+            self.rest = self._lids_on_iris(side)
         self._others = {side: self._other_movement(side) for side in SIDES}
         self._blink = {side: self._declared_blink(side) for side in SIDES}
         self._moved = {side: np.abs(self._blink[side]).max(1) > 1e-5 for side in SIDES}
@@ -59,6 +67,11 @@ class BlinkPath:
 
     def _lower_lid(self, side: int) -> tuple[Index, Array]:
         """Vertices round an eye, and the share of the lower lid's movement that each follows."""
+        near, lower, _ = self._lid_halves(side)
+        return near, lower
+
+    def _lid_halves(self, side: int) -> tuple[Index, Array, Array]:
+        """Vertices round an eye, and the share of the movement of its lower and its upper lid for each."""
         loops = self.loops[side]
         near = np.concatenate(loops)
         loop = np.repeat(np.arange(len(loops), dtype=np.float64), [len(one) for one in loops])
@@ -66,7 +79,25 @@ class BlinkPath:
         _, azimuth, elevation = spherical(self.rest[near] - self.globes[side].centre)
         turned = azimuth * side - nasal
         below = smooth(0.02, -0.04, elevation - (height + slope * turned))
-        return near, lower_lid_weight(loop, below, turned / length)
+        lower, upper = (lower_lid_weight(loop, half, turned / length) for half in (below, 1 - below))
+        return near, lower, upper
+
+    def _lids_on_iris(self, side: int) -> Array:
+        """The resting face with both lids at the iris: the upper one over its rim, the lower one at it.
+
+        The kit's own lids lie anywhere from 1.3 to 2.7 mm over the rim, and left white below some irises.
+        """
+        globe, out = self.globes[side], self.rest.copy()
+        upper, lower = (
+            self.rest[chain] - globe.centre for chain in chains(self.kit, self.loops[side][EDGE_LOOP], side)
+        )
+        at = np.zeros(1)
+        down = IRIS_CM - IRIS_COVERED_CM - float(_profile(at, upper[:, 0], upper[:, 1])[0])
+        up = IRIS_COVERED_BELOW_CM - IRIS_CM - float(_profile(at, lower[:, 0], lower[:, 1])[0])
+        near, of_lower, of_upper = self._lid_halves(side)
+        out[near] = moved_lower_lid(out[near], of_lower, globe, side, up, 0.0)
+        out[near] = moved_lower_lid(out[near], of_upper, globe, side, down, 0.0)
+        return out
 
     def _other_movement(self, side: int) -> Array:
         weights = {"cheekSquint": self.movement.cheek, "eyeSquint": self.movement.squint}

@@ -94,7 +94,10 @@ def eye(colour: Any, height: Any) -> Any:
     pink = [n.math("MULTIPLY_ADD", n.attribute("flush"), share - 1, 1.0) for share in FLUSH]
     left = [n.math("MULTIPLY", *both) for both in zip(shade, pink, strict=True)]
     shaded = n.vector("MULTIPLY", albedo, n.add("CombineXYZ", X=left[0], Y=left[1], Z=left[2]).outputs[0])
-    shader = n.add("BsdfPrincipled", Roughness=0.5, Specular_IOR_Level=0.0)
+    shader = n.add("BsdfPrincipled")
+    # The corner's flesh lies bare and wet; elsewhere the film before the eye mirrors.
+    n.put(n.math("MULTIPLY", n.attribute("flush"), 0.7), shader.inputs["Specular IOR Level"])
+    n.put(n.math("MULTIPLY_ADD", n.attribute("flush"), -0.36, 0.5), shader.inputs["Roughness"])
     n.put(shaded, shader.inputs["Base Color"])
     n.put(n.add("Bump", Strength=0.6, Distance=0.04, Height=relief).outputs[0], shader.inputs["Normal"])
     shader.subsurface_method = "RANDOM_WALK"

@@ -13,7 +13,7 @@ from face_baking.sphere import IRIS_CM
 from stimuli_builder.characters.colour import smooth
 
 GLOBE_CM = 1.5
-WHITE = (0.61, 0.56, 0.52)
+WHITE = (0.47, 0.43, 0.40)
 VEINS = 60
 DRIFT, DRIFT_CM = 0.006, 0.07
 """How far fibers wander on their way outwards: standard deviation at the rim, turns, and its scale, cm.
@@ -67,7 +67,7 @@ class White:
     redness: float = 1.0
 
 
-DARK_WHITE = White(0.84, 1.25)
+DARK_WHITE = White(0.74, 1.25)
 """With dark skin, which a camera gives more light, a white of the usual lightness shone by itself."""
 
 

@@ -1,6 +1,7 @@
 """Lashes that ride on the lids' edges, and brows that lie on the skin, as strands of points in cm."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -8,17 +9,19 @@ from scipy.spatial import cKDTree
 from face_baking.blink_path import BlinkPath
 from face_baking.identity import Hair
 from face_baking.kit import Array, Index
-from face_baking.lid_loops import LASH_LOOP, chains
+from face_baking.lid_loops import LASH_LOOP, SIDES, chains
 from face_baking.lid_skin import FaceSkin, normals
+from face_baking.sphere import spherical
 from stimuli_builder.characters.colour import smooth
 
 LASH_POINTS, BROW_POINTS = 12, 8
-CLUMPS = {True: [0.28, 0.32, 0.26, 0.14], False: [0.60, 0.28, 0.09, 0.03]}
+CLUMPS = {True: [0.14, 0.28, 0.32, 0.26], False: [0.60, 0.28, 0.09, 0.03]}
 """Shares of clumps of one to four lashes of upper and lower lids: lower ones in even bundles look planted."""
-DROOP_DEGREES = 25.0
-"""How far the upper lashes hang down half way, beyond what their lid turns.
+FANNED_UNTIL, RAISED_DEGREES = 0.55, 8.0
+"""Stroke until which the upper lashes point where the open eye's point, and how far they rise on the way.
 
-There they point at the camera, and seen from their tips all of them are one dark line along the lid.
+In recordings they stay fanned before the lid until it is six tenths shut, and only then go down.
+Turned with their lid from the start, they lay before the eye like a comb at closure 0.12.
 """
 TEMPLE = (0.80, 1.05)
 """Where along the upper lid its lashes become sparse, and where there would be none.
@@ -83,15 +86,34 @@ class Lashes:
         tangent = np.stack([np.zeros(len(root)), -radial[:, 2], radial[:, 1]], -1) * (1 if self.upper else -1)
         tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
         if self.upper:
-            radial, tangent = _turned(radial, tangent, DROOP_DEGREES * np.sin(np.pi * stroke))
+            radial, tangent = _turned(radial, tangent, self._held_back(root, low, number - low, stroke))
         first = root - 0.03 * radial + row.lift[:, None] * tangent
         points = _grown(first, radial, tangent, row, self.side)
         return Strands(_clumped(points, row.leader), row.radius)
 
+    @cached_property
+    def _ends(self) -> tuple[Array, Array]:
+        """Elevation about the globe of the points of the lid's edge, open and shut, radians."""
+        globe = self.path.globes[self.side]
+        lines = [
+            edge_line(self.path, self.path.at(dict.fromkeys(SIDES, end)), self.side, LASH_LOOP, self.upper)
+            for end in (0.0, 1.0)
+        ]
+        first, last = (spherical(line - globe.centre)[2] for line in lines)
+        return first, last
 
-def _turned(radial: Array, tangent: Array, degrees: float) -> tuple[Array, Array]:
-    """Both axes of each root turned toward the tangent."""
-    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    def _held_back(self, root: Array, low: Index, share: Array, stroke: float) -> Array:
+        """Radians by which each lash points higher than its lid has turned it, below 0."""
+        opened, shut = (end[low] + share * (end[low + 1] - end[low]) for end in self._ends)
+        here = spherical(root - self.path.globes[self.side].centre)[2]
+        followed = opened + (shut - opened) * smooth(FANNED_UNTIL - 0.15, 1.0, stroke)
+        raised = np.radians(RAISED_DEGREES) * np.sin(np.pi * np.clip(stroke / FANNED_UNTIL / 1.6, 0, 1)) ** 2
+        return np.asarray(here - followed - raised)
+
+
+def _turned(radial: Array, tangent: Array, angle: Array) -> tuple[Array, Array]:
+    """Both axes of each root turned by its radians toward the tangent, or away from it below 0."""
+    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
     return cos * radial + sin * tangent, cos * tangent - sin * radial
 
 
@@ -111,7 +133,7 @@ def _clumped(points: Array, leader: Index) -> Array:
     share = np.clip(reach / reach[leader], 0, 1)
     at = np.round(np.linspace(0, 1, LASH_POINTS)[None] * share[:, None] * (LASH_POINTS - 1)).astype(np.int64)
     target = points[leader[:, None], at]
-    pull = (np.linspace(0, 1, LASH_POINTS) ** 2)[None, :, None] * 0.5
+    pull = (np.linspace(0, 1, LASH_POINTS) ** 1.3)[None, :, None] * 0.85
     return np.asarray(points * (1 - pull) + target * pull)
 
 
@@ -142,13 +164,13 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
         )
         start = np.full(count, 30.0)
         end = 30.0 - 64.0 * curled[clump] * rng.normal(1, 0.07, count)
-        radius = 0.0052 * rng.normal(1, 0.18, count)
+        radius = 0.0074 * rng.normal(1, 0.18, count)
     else:
         size = 0.24 + 0.12 * np.exp(-(((along_lid - 0.62) / 0.3) ** 2))
         size = size * longer[clump] * rng.normal(0.95, 0.26, count)
         fan = 0.40 * middle + fanned[clump] + rng.normal(0, 0.16, count) + gather * 2.0
         start, end = rng.normal(-8.0, 8.0, count), -50.0 * curled[clump] * rng.normal(1, 0.2, count)
-        radius = 0.0032 * rng.normal(1, 0.3, count)
+        radius = 0.0040 * rng.normal(1, 0.3, count)
     size = np.clip(size, 0.12, 1.2) * hair.lash_length
     leader = np.array(
         [np.flatnonzero(clump == g)[np.argmax(size[clump == g])] for g in range(groups)], np.int64
@@ -159,7 +181,7 @@ def _draw_row(hair: Hair, upper: bool, rng: np.random.Generator) -> _LashRow:
 
 def _roots(count: int, upper: bool, rng: np.random.Generator) -> Array:
     """Sorted shares of the lid's length (0 nose, 1 temple) where a row's lashes are, count or fewer."""
-    low, high = (0.13, 0.985) if upper else (0.22, 0.97)
+    low, high = (0.21, 0.985) if upper else (0.22, 0.97)
     along_lid = np.sort(rng.uniform(low, high, count))
     return along_lid[rng.random(count) < smooth(TEMPLE[1], TEMPLE[0], along_lid)] if upper else along_lid
 

@@ -8,12 +8,15 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from experiments.errors import InputError, did_you_mean, wrong_value
-from face_baking.kit import MODES, Array, FaceKit
+from face_baking.field_noise import value_noise
+from face_baking.kit import MODES, SKIN_FACES, Array, FaceKit
 
 IDENTITIES_FILE = Path(__file__).with_name("identities.toml")
 MAX_SEED = 999_999
 MAX_DEVIATIONS = 1.6
 """Identity modes stay within so many standard deviations: the kit's scans hold few faces beyond."""
+UNEVEN_CM, UNEVEN_PER_CM = 0.05, 0.3
+"""Waves that make the halves of a face differ: size, and how many a cm. The kit's modes are symmetrical."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Colour = tuple[Share, Share, Share]
 
@@ -92,7 +95,11 @@ class Identity(_Declared):
 
     def rest(self, kit: FaceKit) -> Array:
         """(26719, 3) vertices of this face at rest."""
-        return np.asarray(kit.neutral + np.tensordot(self.weights(), kit.modes, 1))
+        out = kit.neutral + np.tensordot(self.weights(), kit.modes, 1)
+        skin = np.unique(kit.faces[:SKIN_FACES])[1:]
+        waves = [value_noise(out[skin] * UNEVEN_PER_CM, self.seed + 60 + k, 1) for k in range(3)]
+        out[skin] += UNEVEN_CM * np.stack(waves, -1)
+        return np.asarray(out)
 
 
 def load_identity(name: str, file: Path = IDENTITIES_FILE) -> Identity:

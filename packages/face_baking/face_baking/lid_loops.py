@@ -3,14 +3,28 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from face_baking.kit import EYEBALLS, Array, FaceKit, Index
+from stimuli_builder.characters.colour import smooth
 
 SIDES = (1, -1)
 """1 is the person's left eye (+x), -1 the right one."""
 LOOPS = 14
 EDGE_LOOP, LASH_LOOP = 2, 4
 """The lid's margin lies between both, about 1 mm as it is seen; with lashes on loop 3 it had no thickness."""
+
+CORNER_SHIFT = (
+    (-1.9, -1.3, -0.75, -0.25, 0.0, 0.3, 0.6, 1.0, 1.2),
+    (0.0, 0.12, 0.32, 0.54, 0.49, 0.32, 0.15, 0.0, 0.0),
+)
+"""Way from the corner's old tip toward the temple, and the way of what lies there toward the nose, cm."""
+CORNER_NARROWED = ((-1.9, -0.6, -0.2, 0.1, 0.5, 0.9, 1.2), (0.0, 0.0, -0.05, 0.20, 0.15, 0.0, 0.0))
+"""Share of its height that the wedge loses, at the same places."""
+CORNER_FADES_CM = (0.25, 1.1)
+"""Heights from the corner up to which the shift is whole, and from which there is none."""
+CORNER_BACK = 0.35
+"""Share of the globe's curve that the drawn-out lids follow; the whole of it would sink the corner 3 mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +60,25 @@ def chains(kit: FaceKit, loop: Index, side: int) -> tuple[Index, Index]:
     upper = order[p[order, 1] >= line[order] - 1e-6]
     lower = order[p[order, 1] <= line[order] + 1e-6]
     return loop[upper], loop[lower]
+
+
+def with_longer_corner(kit: FaceKit, rest: Array, loops: list[Index], globe: Globe, side: int) -> Array:
+    """A face whose nasal corner is a wedge that ends as far from the iris as people's; the kit's is blunt.
+
+    Skin between the corner and the nose is pressed together, the last third of the lids drawn out.
+    """
+    upper, _ = chains(kit, loops[EDGE_LOOP], side)
+    tip = rest[upper[0]]
+    across, height = (rest[:, 0] - tip[0]) * side, rest[:, 1] - tip[1]
+    near = (rest[:, 2] > 4) & (np.abs(across) < 2.0) & (np.abs(height) < CORNER_FADES_CM[1])
+    shift = np.where(near, PchipInterpolator(*CORNER_SHIFT)(np.clip(across, -1.9, 1.2)), 0.0)
+    shift *= smooth(CORNER_FADES_CM[1], CORNER_FADES_CM[0], np.abs(height))
+    narrow = np.where(near, PchipInterpolator(*CORNER_NARROWED)(np.clip(across, -1.9, 1.2)), 0.0)
+    narrow *= smooth(1.0, 0.35, np.abs(height))
+    away = rest - globe.centre
+    back = np.clip(away[:, 0] * side / np.maximum(away[:, 2], 0.3), -0.9, 0) * CORNER_BACK
+    move = np.stack([-shift * side, -narrow * height, back * shift], -1)
+    return np.asarray(rest + move)
 
 
 def globe_of(kit: FaceKit, vertices: Array, side: int) -> Globe:

@@ -14,12 +14,12 @@ from face_baking.lid_coordinates import LID_MIDDLE, LidCoordinates
 from face_baking.lid_loops import SIDES, chains
 from stimuli_builder.characters.colour import smooth
 
-FLESH_LOOPS, FLESH_ENDS, FLESH_CM = (0, 1, 2, 3, 4, 5), (2, 5), (0.03, 0.09)
+FLESH_LOOPS, FLESH_ENDS, FLESH_CM = (0, 1, 2, 3), (2, 4), (0.02, 0.07)
 """Loops whose nasal ends are flesh, vertices of it on each one's upper and lower half, and how far it reaches
 next to them.
 
-The lids' edges end blunt and short of the fold between them: what lies there is the kit's own caruncle, and
-with a skin's color it was a pale hook about the white. The lower half's margin begins at its sixth vertex.
+What lies between the lids' ends is the kit's own caruncle, and with a skin's color it was a pale hook about
+the white. Skin begins at the loop of the lashes: as far as the sixth loop the flesh looked like a bruise.
 """
 FOLD_UNROLLS, FOLD_STRETCHED = (0.68, 1.0), (0.0, 0.35)
 """Strokes in which the upper lid's fold unrolls, and in which the skin below it is drawn out of it.
@@ -29,6 +29,8 @@ stretched skin it needs more depth and roll to be as dark as on the open lid, an
 """
 STRETCHED_DEPTH, STRETCHED_ROLL, STRETCHED_WIDTH = 0.8, 0.5, 0.10
 """By how much: shares more, and mesh loops less."""
+FOLD_REMAINS = 0.85
+"""Share of the fold that a shut lid keeps: in recordings its crease and the step above it stay."""
 MOUND_RISE_CM, MOUND_CM = 0.05, 0.10
 """How far the caruncle stands out of the fold, and where it has fallen to 1/e of that."""
 
@@ -84,6 +86,7 @@ class LidRelief:
         height = lids.crease + wander * 0.6
         height = height - 0.9 * smooth(0.1, -0.8, at.azimuth) - 0.5 * smooth(0.5, 1.2, at.azimuth)
         above, opened = at.loop - height, smooth(FOLD_UNROLLS[1], FOLD_UNROLLS[0], stroke)
+        opened = FOLD_REMAINS + (1 - FOLD_REMAINS) * opened
         stretched = opened * smooth(*FOLD_STRETCHED, stroke)
         # Of one depth from end to end it was a line drawn round the eye: it runs out, and is nowhere gone.
         uneven = np.clip(0.85 + 0.9 * wander - 0.35 * np.abs(at.azimuth - LID_MIDDLE), 0.35, 1.1)

@@ -365,10 +365,10 @@ def test_blender_renders_a_shot_that_darkens_the_iris_behind_the_lid(
 
 @pytest.mark.skipif(NO_BLENDER, reason="Blender's environment .venv-bake is not whole here")
 def test_the_catchlight_is_no_matter_of_chance(kit: FaceKit, tmp_path: Path) -> None:
-    """In a picture so large that a catchlight is more than edges: an edge is known to one of 8 samples."""
+    """In a picture so large that a catchlight is more than edges, which are known to one of 32 samples."""
     scene, bright = FaceScene(kit, load_identity("alder"), "eyes", (480, 180)), []
     for seed in (1, 2):
-        shot = Shot(tmp_path / f"{seed}.npz", LidPose(0.0), {"left": scene.lid_boxes["left"]}, 8)
+        shot = Shot(tmp_path / f"{seed}.npz", LidPose(0.0), {"left": scene.lid_boxes["left"]}, 32)
         with Renderer(scene, Setup(BLENDER, "studio", "cpu", 2, tmp_path / "log", seed)) as renderer:
             renderer.render(shot)
         bright.append(_catchlight(scene, shot))

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from face_baking.blink_path import BlinkPath, nasal_tip
-from face_baking.eyes import Mesh, eyeball
+from face_baking.eyes import Mesh, caruncle, eyeball
+from face_baking.hair import edge_line
 from face_baking.identity import identity_of_seed
 from face_baking.kit import FaceKit
-from face_baking.lid_loops import EDGE_LOOP, SIDES
+from face_baking.lid_loops import EDGE_LOOP, LASH_LOOP, SIDES, chains
 from face_baking.scene import Part
 from face_baking.sphere import IRIS_CM
 
@@ -21,6 +22,49 @@ def eye(path: BlinkPath, side: int) -> Mesh:
     return eyeball(path, path.at({1: 0.0, -1: 0.0}), side, 0.0)
 
 
+def near_corner(path: BlinkPath, mesh: Mesh, side: int) -> np.ndarray:
+    """(n,) vertices that in the picture lie within 2.5 mm of the nasal corner."""
+    away = (mesh.vertices - nasal_tip(path, path.rest, side, EDGE_LOOP))[:, :2]
+    return np.asarray(np.linalg.norm(away, axis=1) < 0.25)
+
+
+@pytest.mark.parametrize("stroke", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("side", SIDES)
+def test_the_flesh_of_the_corner_lies_between_the_lids_ends(
+    path: BlinkPath, side: int, stroke: float
+) -> None:
+    posed = path.at({1: stroke, -1: stroke})
+    knob = caruncle(path, posed, side, stroke).vertices
+    upper, lower = chains(path.kit, path.loops[side][EDGE_LOOP], side)
+    corner = posed[upper[0]]
+    assert np.abs(knob[:, 0].mean() - corner[0]) < 0.35
+    assert knob[:, 2].max() < posed[np.concatenate([upper[:5], lower[:7]]), 2].max()
+    assert not np.isclose(knob[:, 1], knob[0, 1]).all()
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_lids_lie_on_the_iris(path: BlinkPath, side: int) -> None:
+    """The upper one covers 2.2 to 2.7 mm of its height, 1.5 to 2 mm of what is seen; the lower one none."""
+    for upper, least, most in ((True, 0.22, 0.27), (False, -0.02, 0.04)):
+        line = edge_line(path, path.rest, side, EDGE_LOOP, upper) - path.globes[side].centre
+        middle = line[np.argmin(np.abs(line[:, 0])), 1]
+        assert least < IRIS_CM - abs(middle) < most
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_nasal_corner_lies_as_far_from_the_iris_as_peoples(path: BlinkPath, side: int) -> None:
+    tip = nasal_tip(path, path.rest, side, EDGE_LOOP) - path.globes[side].centre
+    assert 1.3 < np.abs(tip[0]) < 1.6
+
+
+def test_the_halves_of_a_face_differ(path: BlinkPath) -> None:
+    """By half a millimeter and more in the lids' edges, once mirrored."""
+    left, right = (edge_line(path, path.rest, side, LASH_LOOP, True) for side in SIDES)
+    left, right = (line - path.globes[side].centre for line, side in zip((left, right), SIDES, strict=True))
+    apart = np.abs(left - right * np.array([-1, 1, 1]))
+    assert 0.03 < apart.max() < 0.4
+
+
 @pytest.mark.parametrize("side", SIDES)
 def test_the_white_turns_into_flesh_at_its_nasal_end_alone(path: BlinkPath, side: int) -> None:
     mesh = eye(path, side)
@@ -28,10 +72,9 @@ def test_the_white_turns_into_flesh_at_its_nasal_end_alone(path: BlinkPath, side
     seen = mesh.vertices[:, 2] > centre[2]
     temporal = seen & ((mesh.vertices[:, 0] - centre[0]) * side > 0)
     iris = np.linalg.norm((mesh.vertices - centre)[:, :2], axis=1) < IRIS_CM
-    corner = np.linalg.norm(mesh.vertices - nasal_tip(path, path.rest, side, EDGE_LOOP), axis=1) < 0.15
-    assert flush[seen & corner].min() > 0.9
-    assert flush[temporal].max() == 0
-    assert flush[seen & iris].max() == 0
+    assert flush[seen & near_corner(path, mesh, side)].min() > 0.9
+    assert flush[temporal].max() < 1e-9
+    assert flush[seen & iris].max() < 1e-9
 
 
 def test_the_white_is_darkest_at_the_lids(path: BlinkPath) -> None:
@@ -40,7 +83,7 @@ def test_the_white_is_darkest_at_the_lids(path: BlinkPath) -> None:
     height, shade = (mesh.vertices - centre)[middle, 1], mesh.values["shade"][middle]
     order = np.argsort(height)
     lowest, highest = shade[order][[0, -1]]
-    assert shade.max() > 0.9
+    assert shade.max() > 0.8
     assert max(lowest, highest) < 0.7
 
 
@@ -51,6 +94,5 @@ def test_the_pink_stays_at_the_nose_as_the_eye_turns(kit: FaceKit) -> None:
     aside.look = (25.0, 0.0)
     first, turned = (Part("eye_left", "eye", eye(path, 1)).moving() for path in (ahead, aside))
     assert not np.allclose(first["value_flush"], turned["value_flush"])
-    tip = nasal_tip(ahead, ahead.rest, 1, EDGE_LOOP)
-    near = np.linalg.norm(turned["vertices"] - tip, axis=1) < 0.15
+    near = near_corner(ahead, eye(aside, 1), 1) & (turned["vertices"][:, 2] > ahead.globes[1].centre[2])
     assert turned["value_flush"][near].min() > 0.9
