@@ -180,8 +180,8 @@ DOCS_NOT_BUILT = """<!doctype html>
 <html lang="en">
 <title>Documentation</title>
 <h1>The documentation is not built here</h1>
-<p>Run <code>make docs</code> in the checkout, then load this page again. You can also read the files in
-its folder <code>docs</code>.</p>
+<p><code>make run</code> does not build it. Type <code>make docs</code> in the checkout (a minute or two),
+then load this page again. You can also read the files in its folder <code>docs</code>.</p>
 </html>
 """
 

@@ -36,6 +36,9 @@ TIMED_FILES = (
     "tests/browser/participant/test_sync_patch.py",
 )
 
+# Each of their tests is a piece of work by itself, of up to minutes: any process takes the next one.
+SPREAD_FILES = ("tests/docs/test_commands_run.py",)
+
 # Of the other browser files the longest, longest first: then the processes end at about the same time.
 LONGEST_FILES = tuple(
     f"tests/browser/{name}.py"
@@ -67,11 +70,15 @@ RERUNS = {
 class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
     """A file's tests run in one process, and the timed files in one, so that no two are timed at once.
 
+    Those of `SPREAD_FILES` run wherever there is room.
+
     Not xdist's own groups: it writes them to `_nodeid`, which pytest 9.2 does not read.
     """
 
     def _split_scope(self, nodeid: str) -> str:
         path = str(super()._split_scope(nodeid))
+        if path in SPREAD_FILES:
+            return nodeid
         return "timed" if path in TIMED_FILES else path
 
 

@@ -1,4 +1,4 @@
-"""Files of the names that the documentation's pages use, for `test_commands_run.py`."""
+"""Files and visits that the documentation's pages speak of, for `test_commands_run.py`."""
 
 import csv
 import itertools
@@ -9,10 +9,22 @@ from pathlib import Path
 
 import numpy as np
 from docx import Document
+from fastapi.testclient import TestClient
+from openpyxl import Workbook
 
 from experiments.load import load_experiment, locate
+from server.app import create_app
+from server.core.settings import Settings
+from server.models import Link, Study
+from stimuli_builder.characters.declaration import write_example_character
+from stimuli_builder.tracking.labels import Labels, save_labels
+from stimuli_builder.tracking.shapes import default_markers
+from tests.helpers.studies import FROM_OWN_PAGE, Participant, link_token
 from tests.helpers.tiny_clips import make_clip_folder
 from tests.helpers.videos import write_video
+from tests.stimuli_builder.characters.recordings import Recording
+from tests.stimuli_builder.sync_patch.films import Camera, film, steady
+from tests.stimuli_builder.sync_patch.test_photodiode import write_trace
 
 LIDS = """
 name = "lids"
@@ -67,6 +79,63 @@ def write_inputs(folder: Path) -> None:
     (folder / "recordings").mkdir()
     for speed, shape in itertools.product(("slow", "medium", "fast"), ("disc", "square")):
         write_video(folder / "recordings" / f"{speed}_{shape}.mp4")
+    write_trace(folder / "diode.csv", steady(11, 30.0))
+    write_example_character(folder / "robot")
+
+
+# Visits, and videos that take a while.
+
+
+ABOUT = {"demographics": {"age": 30, "vision": "normal"}}
+"""Answers to the forms of exp3; `lids` has none."""
+
+
+def take_part(folder: Path, study: str, people: int, *, recruiter_id: str = "", answers: bool = True) -> None:
+    """Visits of people in a folder's data, complete ones with `answers`; `recruiter_id` is the first's."""
+    app = create_app(Settings(data_folder=folder / "data"))
+    with TestClient(app, headers=FROM_OWN_PAGE) as client:
+        services = app.state.services
+        with services.database.read() as session:
+            link = session.query(Link).join(Study).filter(Study.name == study, Link.kind == "general").first()
+            token = link_token(services, link)
+        for number, identifier in enumerate([recruiter_id, *[""] * (people - 1)]):
+            person = Participant(client, token)
+            started = person.start(query={"participant": identifier} if identifier else {})
+            assert started.status_code == 201, started.text
+            assert person.request("PUT", "/consent", {"agreed": True}).status_code == 200
+            if answers:
+                _answer_all(person, ABOUT if study == "exp3" else {}, random.Random(number))
+
+
+def _answer_all(person: Participant, forms: Mapping[str, object], draw: random.Random) -> None:
+    for form, given in forms.items():
+        assert person.request("PUT", f"/forms/{form}", {"answers": given}).status_code == 200
+    for trial in person.state()["trials"]:
+        assert person.rate(trial, draw.randint(1, 7)).status_code == 201
+    done = person.request("POST", "/complete")
+    assert done.status_code == 200, done.text
+
+
+def write_person(folder: Path) -> None:
+    """A generated face that blinks, and labels of its landmarks: face.mp4, face.labels.json."""
+    person = Recording(fps=100.0, seconds=5.0, width_px=640, onsets=(0.3, 1.3, 2.3, 3.3, 4.2))
+    person.write(folder, "face")
+    frames = {frame: person.points(frame) for frame in range(0, person.frame_count, 20)}
+    labels = Labels(folder / "face.labels.json", person.size_px, default_markers(2), frames)
+    save_labels(labels, "face.mp4", "generated")
+
+
+def write_recording_with_track(folder: Path) -> None:
+    """A generated recording in slow motion, and its exact track: me.mp4, me.csv."""
+    Recording().write(folder, "me")
+
+
+def write_filmed_screen(folder: Path) -> None:
+    """A clip of 60 frames as a phone films it: slow_motion.mov."""
+    film(folder / "slow_motion.mov", steady(60, 30.0), Camera(), 2400.0)
+
+
+# Tables, declarations and sound.
 
 
 def _write_tables(folder: Path, draw: random.Random) -> None:
@@ -95,6 +164,11 @@ def _write_tables(folder: Path, draw: random.Random) -> None:
             "participant": person, **{f"q{item}": round(level + draw.gauss(0, 0.7)) for item in range(1, 6)}
         })  # fmt: skip
     _write_csv(folder / "items.csv", answers)
+    wide = Workbook()
+    wide.active.append(["id", "ada_on", "ada_off", "bea_on", "bea_off"])
+    for person in PARTICIPANTS:
+        wide.active.append([person, *(draw.randint(1, 7) for _ in range(4))])
+    wide.save(folder / "wide.xlsx")
     # Eyes open 0.3 of their width, blinking every 3 s for 200 ms, at 240 frames per second.
     time_s = np.arange(0, 30, 1 / 240)
     closure = np.clip(1 - np.abs((time_s % 3) - 1.5) / 0.1, 0, 1) ** 0.7

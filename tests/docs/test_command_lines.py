@@ -10,16 +10,24 @@ import pytest
 from typer.main import get_command
 
 from analysis.cli import app as analysis
+from palpebra.cli import app as palpebra
+from palpebra.cli import with_start
 from server.cli import app as server
 from stimuli_builder.cli import app as stimuli
 from tests.conftest import REPOSITORY
 
-PROGRAMS = {"stimuli": get_command(stimuli), "server": get_command(server), "analysis": get_command(analysis)}
+PROGRAMS = {
+    "stimuli": get_command(stimuli),
+    "server": get_command(server),
+    "analysis": get_command(analysis),
+    "palpebra": get_command(palpebra),
+}
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^[ ]*```([^\n`]*)\n(.*?)^[ ]*```[ ]*$", re.MULTILINE | re.DOTALL)
 SHELL = {"", "sh", "text", "console"}
-INLINE = re.compile(r"(?<!`)`((?:stimuli|server|analysis) [^`\n]+)`")
-COMMAND = re.compile(r"\s*(stimuli|server|analysis) [a-z-]")
+INLINE = re.compile(r"(?<!`)`((?:stimuli|server|analysis|palpebra) [^`\n]+)`")
+SET = r"(?:[A-Z_]+=\S+ )*"  # variables before a command
+COMMAND = re.compile(rf"\s*{SET}(?:(?:stimuli|server|analysis|palpebra) [a-z-]|palpebra\s*(?:#.*)?$)")
 # what is between quotation marks, such as a formula with |, stays whole
 PIECE = re.compile(r"(?:'[^']*'|[^'|;&]|&(?!&)|'(?![^']*'))+")
 
@@ -31,9 +39,11 @@ class PrintedLine:
     line: int
     text: str
     inline: bool
+    is_cell: bool = False
+    """Whether it is all that a cell of a table holds: a command, not the name of one."""
 
     def commands(self) -> list[str]:
-        """The commands of the three programs in it, `$(...)` written as X."""
+        """The commands of the programs in it, `$(...)` written as X."""
         lines = self.text.replace("\\\n", " ").splitlines()
         pieces = self.text.split("&&") if self.inline else [p for line in lines for p in PIECE.findall(line)]
         return [re.sub(r"\$\([^)]*\)", "X", piece).strip() for piece in pieces if COMMAND.match(piece)]
@@ -56,7 +66,13 @@ def printed_lines(text: str) -> list[PrintedLine]:
                 joined = ""
     without_blocks = BLOCK.sub(lambda block: "\n" * block[0].count("\n"), text)
     printed += [
-        PrintedLine(without_blocks.count("\n", 0, code.start()) + 1, code[1], inline=True)
+        PrintedLine(
+            without_blocks.count("\n", 0, code.start()) + 1,
+            code[1],
+            inline=True,
+            is_cell=without_blocks.endswith("| ", 0, code.start())
+            and without_blocks.startswith(" |", code.end()),
+        )
         for code in INLINE.finditer(without_blocks)
     ]
     return sorted(printed, key=lambda line: line.line)
@@ -67,9 +83,15 @@ def command_lines(text: str) -> list[str]:
     return [command for line in printed_lines(text) for command in line.commands()]
 
 
+def words_of(command: str) -> list[str]:
+    """Program, command, options and arguments; `palpebra` alone starts the server."""
+    words = shlex.split(re.sub(rf"^{SET}", "", command.strip()).partition(" > ")[0], comments=True)
+    return [words[0], *with_start(words[1:])] if words[0] == "palpebra" else words
+
+
 def fault_of(line: str) -> str | None:
     """What does not exist in a command line, or None."""
-    words = shlex.split(line.replace("...", "").partition(" > ")[0], comments=True)
+    words = words_of(line.replace("...", ""))
     command: Any = PROGRAMS[words[0]]
     context = command.context_class(command, info_name=words[0])
     rest = words[1:]

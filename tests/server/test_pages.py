@@ -49,6 +49,16 @@ def test_every_admin_address_is_the_admin_page_with_a_nonce_of_its_own(
         assert f"'nonce-{answer.text.split(chr(34))[1]}'" in answer.headers["content-security-policy"]
 
 
+def test_documentation_that_is_not_built_says_what_to_type(client: TestClient, pages: Path) -> None:
+    answer = client.get("/docs/how-to/install.html")
+    assert answer.status_code == 503
+    assert "<code>make docs</code>" in answer.text
+    (pages / "docs").mkdir()
+    (pages / "docs" / "index.html").write_text("<title>docs</title>")
+    assert client.get("/docs/").status_code == 200
+    assert client.get("/docs/how-to/install.html").status_code == 404
+
+
 def test_the_root_leads_to_the_admin_site(client: TestClient) -> None:
     answer = client.get("/", follow_redirects=False)
     assert (answer.status_code, answer.headers["location"]) == (307, "/admin/")
