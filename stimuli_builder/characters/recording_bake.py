@@ -363,7 +363,8 @@ def _limits_of_recording(baked: RecordingBake, track: EyeTrack) -> Iterator[str]
     frames = baked.frames
     if (floor := float((track.shut_px / track.open_px).max())) > FLOOR_SHARE:
         yield (
-            f"The tracker still sees {floor:.0%} of the opening in shut eyes. Label some shut frames "
+            f"In shut eyes the tracker measures {floor:.0%} of the open eye's opening. Openings in this "
+            "report count from there, so they do not say how far the eyes really shut. Label some shut frames "
             "(docs/how-to/label-frames.md), and give the track."
         )
     if (moved := float(frames.head_mm.max())) > HEAD_MM:

@@ -255,6 +255,6 @@ def test_without_a_track_the_command_tracks_first(
     assert ended.value.code == 0
     said = capsys.readouterr().out
     assert "left-out frames: median" in said
-    assert "limit: The tracker still sees" in said
+    assert "limit: In shut eyes the tracker measures" in said
     assert (out / "track.csv").is_file()
     assert (out / "report.html").is_file()
