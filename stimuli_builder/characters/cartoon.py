@@ -10,10 +10,10 @@ import skia
 from numpy.typing import NDArray
 
 from experiments.errors import InputError
-from stimuli_builder.characters.cartoon_eye import EYES, OPENING_MM, draw_eye, draw_eyeball, draw_socket
+from stimuli_builder.characters.cartoon_eye import OPENING_MM, draw_eye, draw_eyeball, draw_socket
 from stimuli_builder.characters.cartoon_face import BROW_DROP_MM, draw_brow, draw_skin
+from stimuli_builder.characters.cartoon_pen import CARTOON, CartoonLook
 
-NAME = "cartoon"
 FRAME_MM = (128.0, 48.0)
 INTER_OCULAR_MM = 60.0
 LEVELS = 129
@@ -22,11 +22,14 @@ CROP_MM = (-57.0, -14.0, 57.0, 26.0)
 BROW_BAND_MM = (25.0, 7.5)
 _CENTRE_Y_MM = 3.5
 
-__all__ = ["INTER_OCULAR_MM", "LEVELS", "NAME", "OPENING_MM", "crop_px", "draw_frame", "fingerprint"]
+__all__ = ["INTER_OCULAR_MM", "LEVELS", "OPENING_MM", "crop_px", "draw_frame", "fingerprint"]
 
 
 def draw_frame(
-    closure: float, size_px: tuple[int, int], window: tuple[int, int, int, int] | None = None
+    closure: float,
+    size_px: tuple[int, int],
+    window: tuple[int, int, int, int] | None = None,
+    look: CartoonLook = CARTOON,
 ) -> NDArray[np.float32]:
     """(h, w, 3) gamma-encoded sRGB in 0-1 of the character at a closure (0 open, 1 closed).
 
@@ -36,11 +39,13 @@ def draw_frame(
         Of the whole frame; 8:3.
     window : (x, y, width, height), optional
         The part of the frame to draw.
+    look : CartoonLook
+        The drawn character.
     """
     if not 0.0 <= closure <= 1.0:
         raise InputError(f"closure must lie between 0 (open) and 1 (closed), got {closure:g}")
     x, y, width, height = window or (0, 0, *size_px)
-    picture = _rasterise(closure, size_px, (x, y, width, height))
+    picture = _rasterise(closure, size_px, (x, y, width, height), look)
     return picture + _grain(size_px)[y : y + height, x : x + width, None]
 
 
@@ -56,22 +61,22 @@ def crop_px(size_px: tuple[int, int]) -> tuple[int, int, int, int]:
     return x0, y0, x1 - x0, y1 - y0
 
 
-def fingerprint() -> str:
-    """SHA-256 of all that decides how the cartoon looks: its source and the drawing library's version."""
-    digest = hashlib.sha256(skia.__version__.encode())
+def fingerprint(look: CartoonLook) -> str:
+    """SHA-256 of all that decides how a drawn character looks: source, name, drawing library."""
+    digest = hashlib.sha256(f"{skia.__version__} {look.name}".encode())
     for file in sorted(Path(__file__).parent.glob("cartoon*.py")):
         digest.update(file.read_bytes())
     return digest.hexdigest()
 
 
 def _rasterise(
-    closure: float, size_px: tuple[int, int], window: tuple[int, int, int, int]
+    closure: float, size_px: tuple[int, int], window: tuple[int, int, int, int], look: CartoonLook
 ) -> NDArray[np.float32]:
     x, y, width, height = window
     surface = _surface(width, height)
     canvas = surface.getCanvas()
     canvas.translate(-x, -y)
-    skin, brows, eyeballs = _still_parts(size_px)
+    skin, brows, eyeballs = _still_parts(size_px, look)
     canvas.drawImage(skin, 0, 0)
     _lower_brows(canvas, brows, closure, size_px)
 
@@ -82,8 +87,8 @@ def _rasterise(
         target.restore()
 
     _to_mm(canvas, size_px)
-    for shape in EYES:
-        draw_eye(canvas, shape, closure, paint_eyeballs)
+    for shape in look.eyes:
+        draw_eye(canvas, shape, closure, paint_eyeballs, look)
     pixels = np.empty((height, width, 4), np.float16)
     surface.readPixels(surface.imageInfo(), pixels, pixels.strides[0], 0, 0)
     return pixels[..., :3].astype(np.float32)
@@ -92,9 +97,9 @@ def _rasterise(
 def _lower_brows(canvas: skia.Canvas, brows: skia.Image, closure: float, size_px: tuple[int, int]) -> None:
     smooth = skia.SamplingOptions(skia.CubicResampler.Mitchell())
     scale = size_px[0] / FRAME_MM[0]
-    for shape in EYES:
+    for side in (-1, 1):
         canvas.save()
-        middle = size_px[0] / 2 + shape.side * 32.0 * scale
+        middle = size_px[0] / 2 + side * 32.0 * scale
         top, bottom = (size_px[1] / 2 - (y - _CENTRE_Y_MM) * scale for y in BROW_BAND_MM)
         canvas.clipRect(skia.Rect.MakeLTRB(middle - 24 * scale, top, middle + 24 * scale, bottom))
         canvas.drawImage(brows, 0, BROW_DROP_MM * closure * scale, smooth)
@@ -102,7 +107,7 @@ def _lower_brows(canvas: skia.Canvas, brows: skia.Image, closure: float, size_px
 
 
 @lru_cache(maxsize=2)
-def _still_parts(size_px: tuple[int, int]) -> tuple[skia.Image, skia.Image, skia.Image]:
+def _still_parts(size_px: tuple[int, int], look: CartoonLook) -> tuple[skia.Image, skia.Image, skia.Image]:
     """Skin, brows and eyeballs: what keeps its form in a blink is drawn once."""
 
     def draw_all(paint: Callable[[skia.Canvas], None]) -> skia.Image:
@@ -113,17 +118,17 @@ def _still_parts(size_px: tuple[int, int]) -> tuple[skia.Image, skia.Image, skia
         return surface.makeImageSnapshot()
 
     def skin(canvas: skia.Canvas) -> None:
-        draw_skin(canvas)
-        for shape in EYES:
-            draw_socket(canvas, shape)
+        draw_skin(canvas, look)
+        for shape in look.eyes:
+            draw_socket(canvas, shape, look)
 
     def brows(canvas: skia.Canvas) -> None:
-        for shape in EYES:
-            draw_brow(canvas, shape.side)
+        for shape in look.eyes:
+            draw_brow(canvas, shape.side, look)
 
     def eyeballs(canvas: skia.Canvas) -> None:
-        for shape in EYES:
-            draw_eyeball(canvas, shape)
+        for shape in look.eyes:
+            draw_eyeball(canvas, shape, look)
 
     return draw_all(skin), draw_all(brows), draw_all(eyeballs)
 

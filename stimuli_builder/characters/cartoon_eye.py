@@ -1,12 +1,22 @@
 """One cartoon eye: margins calibrated to the declared opening, eyeball, lid, lashes."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import skia
 
-from stimuli_builder.characters.cartoon_pen import Curve, between, colour, fill, glow, polygon, taper, wash
+from stimuli_builder.characters.cartoon_pen import (
+    CartoonLook,
+    Curve,
+    EyeShape,
+    between,
+    colour,
+    fill,
+    glow,
+    polygon,
+    taper,
+    wash,
+)
 
 OPENING_MM = 11.0
 NASAL_MM, LATERAL_MM = -13.4, 13.6
@@ -27,25 +37,13 @@ CATCH_LIGHTS = ((-2.25, 2.15, 1.55, 0.98), (2.3, -2.7, 0.62, 0.75))
 """Window and bounce: x towards the image's right, y, radius in mm, opacity."""
 
 
-@dataclass(frozen=True)
-class EyeShape:
-    """What differs between the two eyes; lengths in mm, `side` -1 for the eye at the image's left."""
-
-    side: int
-    centre_y_mm: float
-    tilt: float
-    crease_mm: float
-    lash_scale: float
-
-
-EYES = (EyeShape(-1, 0.0, 0.075, 2.5, 1.0), EyeShape(1, 0.25, 0.068, 2.15, 0.95))
-
-
 def margins(shape: EyeShape, closure: float) -> tuple[Curve, Curve, Curve]:
     """Local x (lateral positive) and the visible edges of upper and lower lid in mm at a closure.
 
-    What shows of the eyeball lies between them: OPENING_MM (1 - closure) high where it is highest.
+    What shows of the eyeball lies between them: OPENING_MM (1 - closure) high where it is highest. Where one
+    eye leads, that is the mean of both.
     """
+    closure = closure + shape.lead * np.sin(np.pi * closure)
     x, upper, lower = _open_margins(shape)
     u = (x - NASAL_MM) / (LATERAL_MM - NASAL_MM)
     raised = lower + LOWER_RISE_MM * closure * np.sin(np.pi * u) ** 1.5
@@ -63,7 +61,11 @@ def _open_margins(shape: EyeShape) -> tuple[Curve, Curve, Curve]:
 
 
 def draw_eye(
-    canvas: skia.Canvas, shape: EyeShape, closure: float, paint_eyeball: Callable[[skia.Canvas], None]
+    canvas: skia.Canvas,
+    shape: EyeShape,
+    closure: float,
+    paint_eyeball: Callable[[skia.Canvas], None],
+    look: CartoonLook,
 ) -> None:
     """Draw the eye at a closure on a canvas in mm, the origin midway between the eyes.
 
@@ -79,9 +81,11 @@ def draw_eye(
         canvas.clipPath(between(x, upper + 0.25, lower), True)
         paint_eyeball(canvas)
         _lid_shadow(canvas, shape, x, upper)
+        if look.darkens:
+            canvas.drawPaint(skia.Paint(Color=colour(LASH, float(np.clip((closure - 0.7) / 0.2, 0.0, 1.0)))))
         canvas.restore()
-    _upper_lid(canvas, shape, x, upper, open_upper, closure)
-    _lower_lid(canvas, x, lower)
+    _upper_lid(canvas, shape, (x, upper, open_upper), closure, look)
+    _lower_lid(canvas, x, lower, look)
     _lash_line(canvas, shape, x, upper, closure)
     canvas.restore()
 
@@ -91,20 +95,20 @@ def _go_to(canvas: skia.Canvas, shape: EyeShape) -> None:
     canvas.scale(shape.side, 1)
 
 
-def draw_socket(canvas: skia.Canvas, shape: EyeShape) -> None:
+def draw_socket(canvas: skia.Canvas, shape: EyeShape, look: CartoonLook) -> None:
     """Shade the hollow around one eye."""
     canvas.save()
     _go_to(canvas, shape)
     canvas.scale(1, 0.72)
-    shade = [colour("#b4664a", 0.42), colour("#b4664a", 0.20), colour("#b4664a", 0.0)]
+    shade = [look.skin("#b4664a", 0.42), look.skin("#b4664a", 0.20), look.skin("#b4664a", 0.0)]
     glow(canvas, (-1.0, 4.6), 21.0, shade, (0.0, 0.55, 1.0))
     # The light comes from the image's left, so each socket is deeper on its far side.
     nose_side = -6.0 * shape.side
-    glow(canvas, (-nose_side, 6.0), 13.0, [colour("#8e4a3c", 0.20), colour("#8e4a3c", 0.0)], (0.0, 1.0))
+    glow(canvas, (-nose_side, 6.0), 13.0, [look.skin("#8e4a3c", 0.20), look.skin("#8e4a3c", 0.0)], (0.0, 1.0))
     canvas.restore()
 
 
-def draw_eyeball(canvas: skia.Canvas, shape: EyeShape) -> None:
+def draw_eyeball(canvas: skia.Canvas, shape: EyeShape, look: CartoonLook) -> None:
     """Draw white, caruncle and iris of one eye, wider than any opening."""
     canvas.save()
     _go_to(canvas, shape)
@@ -114,7 +118,7 @@ def draw_eyeball(canvas: skia.Canvas, shape: EyeShape) -> None:
     shade = [colour("#fffdf8", 0.0), colour("#c9bfc6", 0.28), colour("#77718f", 0.72)]
     glow(canvas, (-2.2 * shape.side, 1.2), 17.5, shade, (0.0, 0.55, 1.0))
     fill(canvas, polygon(*_caruncle(shape)), colour("#e8a496"), 0.35)
-    _iris(canvas, shape.side)
+    _iris(canvas, shape.side, look)
     canvas.restore()
 
 
@@ -131,7 +135,7 @@ def _caruncle(shape: EyeShape) -> tuple[Curve, Curve]:
     return NASAL_MM + 0.5 + 2.1 * np.cos(angle), y - 0.15 + 1.35 * np.sin(angle)
 
 
-def _iris(canvas: skia.Canvas, side: int) -> None:
+def _iris(canvas: skia.Canvas, side: int, look: CartoonLook) -> None:
     canvas.save()
     # Both eyes converge a little on the viewer.
     canvas.translate(-0.25, -0.15)
@@ -146,7 +150,7 @@ def _iris(canvas: skia.Canvas, side: int) -> None:
         canvas,
         (-1.2 * side, radius),
         (1.2 * side, -radius),
-        [colour("#1f5a5c"), colour("#2f8a80"), colour("#63c3a0"), colour("#c2edb9")],
+        [colour(code) for code in look.iris],
         (0.0, 0.38, 0.72, 1.0),
     )
     _streaks(canvas)
@@ -154,7 +158,7 @@ def _iris(canvas: skia.Canvas, side: int) -> None:
         canvas,
         (0.0, 0.0),
         4.1,
-        [colour("#e2b45c", 0.85), colour("#e2b45c", 0.5), colour("#e2b45c", 0.0)],
+        [colour(look.iris_glow, opacity) for opacity in (0.85, 0.5, 0.0)],
         (0, 0.72, 1),
     )
     canvas.restore()
@@ -172,8 +176,13 @@ def _streaks(canvas: skia.Canvas) -> None:
 
 
 def _upper_lid(
-    canvas: skia.Canvas, shape: EyeShape, x: Curve, upper: Curve, open_upper: Curve, closure: float
+    canvas: skia.Canvas,
+    shape: EyeShape,
+    curves: tuple[Curve, Curve, Curve],
+    closure: float,
+    look: CartoonLook,
 ) -> None:
+    x, upper, open_upper = curves
     u = (x - NASAL_MM) / (LATERAL_MM - NASAL_MM)
     bow = np.sin(np.pi * np.clip(u, 0, 1))
     crease = open_upper + 0.35 + shape.crease_mm * bow**0.6 - 0.8 * closure * bow
@@ -181,13 +190,13 @@ def _upper_lid(
     canvas.save()
     # Down to the middle of the lash line, which hides the seam.
     canvas.clipPath(between(x, np.maximum(crease, upper + 0.2), upper + 0.2), True)
-    canvas.drawPaint(skia.Paint(Color=colour("#dd9a76")))
+    canvas.drawPaint(skia.Paint(Color=look.skin("#dd9a76")))
     middle = float(np.mean(upper + crease) / 2)
-    shine = [colour("#ffd3ae", 1.0), colour("#efb48d", 0.9), colour("#d08c6a", 0.0)]
+    shine = [look.skin("#ffd3ae", 1.0), look.skin("#efb48d", 0.9), look.skin("#d08c6a", 0.0)]
     glow(canvas, (-3.6 * shape.side, middle + 1.0 + 0.8 * closure), 12.5, shine, (0.0, 0.5, 1.0))
-    taper(canvas, x, crease, 3.4, colour("#9c5540", 0.55), blur_mm=0.8)
+    taper(canvas, x, crease, 3.4, look.skin("#9c5540", 0.55), blur_mm=0.8)
     # The margin turns away from the light and picks up the lashes' warmth.
-    taper(canvas, x, upper + 0.9, 1.8, colour("#a45a4a", 0.30 + 0.1 * closure), blur_mm=0.5)
+    taper(canvas, x, upper + 0.9, 1.8, look.skin("#a45a4a", 0.30 + 0.1 * closure), blur_mm=0.5)
     canvas.restore()
     inside = slice(6, -2)
     taper(
@@ -195,14 +204,14 @@ def _upper_lid(
     )
 
 
-def _lower_lid(canvas: skia.Canvas, x: Curve, lower: Curve) -> None:
+def _lower_lid(canvas: skia.Canvas, x: Curve, lower: Curve, look: CartoonLook) -> None:
     inside = slice(10, None)
     # The lower edge of the picture of the eye is `lower`: rim and line lie below it.
-    taper(canvas, x[inside], lower[inside] - 0.42, 0.85, colour("#f6b59b"), ends=(0.2, 0.5))
+    taper(canvas, x[inside], lower[inside] - 0.42, 0.85, look.skin("#f6b59b"), ends=(0.2, 0.5))
     taper(canvas, x[inside], lower[inside] - 0.92, 0.55, colour(INK, 0.85), ends=(0.05, 0.9), peak=0.8)
     fold = slice(28, 128)
     bow = np.sin(np.linspace(0, np.pi, 100))
-    taper(canvas, x[fold], lower[fold] - 2.0 - 1.1 * bow, 0.5, colour("#a5573f", 0.45), blur_mm=0.12)
+    taper(canvas, x[fold], lower[fold] - 2.0 - 1.1 * bow, 0.5, look.skin("#a5573f", 0.45), blur_mm=0.12)
     for share, length in ((0.80, 1.2), (0.88, 1.5)):
         at = int(share * (len(x) - 1))
         start = np.array([x[at], lower[at] - 0.95])

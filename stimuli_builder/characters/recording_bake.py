@@ -364,8 +364,8 @@ def _limits_of_recording(baked: RecordingBake, track: EyeTrack) -> Iterator[str]
     if (floor := float((track.shut_px / track.open_px).max())) > FLOOR_SHARE:
         yield (
             f"In shut eyes the tracker measures {floor:.0%} of the open eye's opening. Openings in this "
-            "report count from there, so they do not say how far the eyes really shut. Label some shut frames "
-            "(docs/how-to/label-frames.md), and give the track."
+            "report count from there, so they do not say how far the eyes really shut. Label some shut "
+            "frames (docs/how-to/label-frames.md), and give the track."
         )
     if (moved := float(frames.head_mm.max())) > HEAD_MM:
         yield f"The head moved by {moved:.1f} mm during the blink. Rest the head against a wall or chin rest."

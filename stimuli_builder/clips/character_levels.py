@@ -14,6 +14,7 @@ from stimuli_builder.characters import cartoon
 from stimuli_builder.characters.atlas import Atlas, LevelCodes, load_atlas
 from stimuli_builder.characters.cartoon_eye import OPENING_MM
 from stimuli_builder.characters.cartoon_face import BROW_DROP_MM
+from stimuli_builder.characters.cartoon_pen import CartoonLook
 from stimuli_builder.characters.colour import LINEAR_OF_CODE, srgb_to_linear
 from stimuli_builder.characters.declaration import LowerLid as DeclaredLowerLid
 from stimuli_builder.clips.geometry import Geometry
@@ -169,16 +170,18 @@ def _resized(frame: NDArray[np.float32], size_px: tuple[int, int]) -> NDArray[np
     return np.asarray(cv2.resize(frame, size_px, interpolation=method), np.float32)
 
 
-# The cartoon as clips need it: drawn again at every size.
+# Drawn characters as clips need them: drawn again at every size.
 
-NAME = "cartoon"
 NATIVE_WIDTH_PX = 960
 SPARE_PX = 4
 """Rows of the crop, above and below, in which nothing moves."""
 
 
 class CartoonCharacter:
-    """The vector drawing of `stimuli_builder.characters.cartoon`; it has no lower-lid layer."""
+    """A vector drawing of `stimuli_builder.characters.cartoon`; it has no lower-lid layer."""
+
+    def __init__(self, look: CartoonLook) -> None:
+        self._look = look
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -188,7 +191,7 @@ class CartoonCharacter:
         size = (NATIVE_WIDTH_PX, height)
         _, first, _, rows = cartoon.crop_px(size)
         return Geometry(
-            NAME,
+            self._look.name,
             size,
             scale,
             cartoon.INTER_OCULAR_MM,
@@ -201,26 +204,26 @@ class CartoonCharacter:
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of the drawing's source and library."""
-        return cartoon.fingerprint()
+        return cartoon.fingerprint(self._look)
 
     def levels(self, size_px: tuple[int, int]) -> LevelSet:
-        """The cartoon at a size: the width scales it, a lower height cuts skin above and below."""
+        """The drawing at a size: the width scales it, a lower height cuts skin above and below."""
         scaled, top = self.geometry.scaled(*size_px)
         x, y, width, height = cartoon.crop_px(scaled)
         window = window_inside(x, y - top, width, height, size_px)
         closures = np.linspace(0.0, 1.0, cartoon.LEVELS)
         levels = np.empty((len(closures), window.height, window.width, 3), np.uint16)
         rectangle = (window.x, window.y + top, window.width, window.height)
-        opened = cartoon.draw_frame(0.0, scaled, rectangle)
+        opened = cartoon.draw_frame(0.0, scaled, rectangle, self._look)
         levels[:] = _light_of_code(opened)
         for level, closure in zip(levels[1:], closures[1:], strict=True):
-            drawn = cartoon.draw_frame(float(closure), scaled, rectangle)
+            drawn = cartoon.draw_frame(float(closure), scaled, rectangle, self._look)
             # Skin stands still, and a power costs more than a comparison.
             moved = np.flatnonzero(drawn != opened)
             level.reshape(-1)[moved] = _light_of_code(drawn.reshape(-1)[moved])
-        base = _light_of_code(cartoon.draw_frame(0.0, scaled, (0, top, *size_px)))
+        base = _light_of_code(cartoon.draw_frame(0.0, scaled, (0, top, *size_px), self._look))
         base[window.slices] = levels[0]
-        return LevelSet(NAME, base, levels, closures, window, scaled[0] / cartoon.FRAME_MM[0])
+        return LevelSet(self._look.name, base, levels, closures, window, scaled[0] / cartoon.FRAME_MM[0])
 
 
 def _light_of_code(code: NDArray[np.float32]) -> Light:

@@ -1,6 +1,5 @@
 """Find a character by name or folder; what reads or draws it is loaded when it is asked for."""
 
-from collections.abc import Callable, Mapping
 from functools import lru_cache
 from pathlib import Path
 
@@ -49,7 +48,7 @@ def character_folder(name: str, beside: Path | None = None) -> Path:
 def find_character(name: str, beside: Path | None = None) -> Character:
     """The character of a shipped name, or of a folder relative to `beside`."""
     if name in DRAWN:
-        return DRAWN[name]()
+        return _drawn(name)
     return _baked(character_folder(name, beside))
 
 
@@ -63,11 +62,12 @@ def fingerprint(name: str, beside: Path | None = None) -> str:
     return find_character(name, beside).fingerprint
 
 
-@lru_cache(maxsize=1)
-def _cartoon() -> Character:
+@lru_cache(maxsize=2)
+def _drawn(name: str) -> Character:
+    from stimuli_builder.characters.cartoon_pen import LOOKS
     from stimuli_builder.clips.character_levels import CartoonCharacter
 
-    return CartoonCharacter()
+    return CartoonCharacter(LOOKS[name])
 
 
 @lru_cache(maxsize=16)
@@ -77,5 +77,5 @@ def _baked(folder: Path) -> Character:
     return BakedCharacter(folder)
 
 
-DRAWN: Mapping[str, Callable[[], Character]] = {"cartoon": _cartoon}
+DRAWN = ("cartoon", "cartoon-willow")
 """Characters that are drawn by a program; every other is a folder of pictures."""

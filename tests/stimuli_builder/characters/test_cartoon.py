@@ -5,6 +5,8 @@ import pytest
 
 from experiments.errors import InputError
 from stimuli_builder.characters.cartoon import LEVELS, OPENING_MM, crop_px, draw_frame, fingerprint
+from stimuli_builder.characters.cartoon_eye import margins
+from stimuli_builder.characters.cartoon_pen import CARTOON, WILLOW, CartoonLook
 
 SIZE = (1920, 720)
 PX_PER_MM = 15.0
@@ -78,5 +80,35 @@ def test_closure_outside_its_range_is_refused(closure: float) -> None:
         draw_frame(closure, (320, 120))
 
 
-def test_the_fingerprint_is_a_hash() -> None:
-    assert len(fingerprint()) == 64
+def test_each_drawing_has_its_own_fingerprint() -> None:
+    assert [len(fingerprint(look)) for look in (CARTOON, WILLOW)] == [64, 64]
+    assert fingerprint(CARTOON) != fingerprint(WILLOW)
+
+
+def white_mm(closure: float, side: int) -> float:
+    """Height of the white of one eye of `cartoon-willow` in the column 8 mm to the temple."""
+    x = 960 + round(side * 38 * PX_PER_MM)
+    column = draw_frame(closure, SIZE, (x, 260, 1, 260), WILLOW)[:, 0]
+    # Bluish next to skin, lashes and rims, all of which are brown.
+    return float((column[:, 2] > 0.8 * column[:, 0]).sum() / PX_PER_MM)
+
+
+@pytest.mark.parametrize("closure", [0.15, 0.3, 0.5, 0.6])
+def test_eyes_of_which_one_leads_open_as_declared_in_the_mean(closure: float) -> None:
+    opened, now = (np.array([white_mm(c, side) for side in (-1, 1)]) for c in (0.0, closure))
+    shares = now / opened
+    assert shares.mean() == pytest.approx(1 - closure, abs=0.025)
+    assert shares[1] - shares[0] == pytest.approx(0.05 * np.sin(np.pi * closure), abs=0.025)
+
+
+@pytest.mark.parametrize("look", [CARTOON, WILLOW], ids=lambda look: look.name)
+def test_nothing_of_the_iris_glows_between_lids_that_nearly_touch(look: CartoonLook) -> None:
+    """The first drawing keeps its line of iris: studies have its clips."""
+    (left, _), closure = look.eyes, 0.93
+    x, upper, lower = margins(left, closure)
+    picture = draw_frame(closure, SIZE, look=look)
+    at = np.flatnonzero(np.abs(x) < 4)
+    rows = 360 - ((upper[at] + lower[at]) / 2 + left.centre_y_mm - 3.5) * PX_PER_MM
+    columns = 960 + (-30 - x[at]) * PX_PER_MM
+    brightest = picture[rows.round().astype(int), columns.round().astype(int)].max()
+    assert (brightest < 0.25) == look.darkens
