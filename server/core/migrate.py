@@ -126,7 +126,7 @@ def _known_revisions() -> tuple[frozenset[str], str]:
     files = (Path(migrations.__file__).parent / "versions").glob("*.py")
     texts = [path.read_text(encoding="utf-8") for path in files]
     known, built_on = (
-        {found for text in texts for found in re.findall(rf'^{name} = "(\w+)"', text, re.MULTILINE)}
+        {revision for text in texts for revision in re.findall(rf'^{name} = "(\w+)"', text, re.MULTILINE)}
         for name in ("revision", "down_revision")
     )
     (newest,) = known - built_on

@@ -1,4 +1,4 @@
-"""Clips of one's own study in the grid of its cells: dragged, put by keyboard, filled by file names."""
+"""Clips of your own study in the grid of its cells: dragged, put by keyboard, filled by file names."""
 
 import io
 import json
