@@ -33,10 +33,10 @@ from tests.helpers.ports import free_port
 
 LIMIT_S = 1200
 DECIDED = ("decisions", "tutorials", "generated")  # records, pages with a test of their own, generated pages
-POSTGRESQL = "needs the reader's PostgreSQL; tests/server/operations/test_copying.py copies to one"
+POSTGRESQL = "needs the reader's PostgreSQL; tests/server/operations/test_backup.py copies to one"
 EXCEPTIONS = {
     "server restore s3://lab-backups/palpebra/palpebra-2026-01-31T030000.tar.age --identity backups.key": (
-        "needs the reader's object store; tests/server/operations/test_backup_stores.py restores from one"
+        "needs the reader's object store; tests/server/operations/test_off_host.py restores from one"
     ),
     "server database copy sqlite:///data/palpebra.sqlite postgresql://me@host/palpebra": POSTGRESQL,
     "DATABASE_URL=postgresql://me@host/palpebra server doctor": POSTGRESQL,
@@ -106,7 +106,7 @@ ANSWERS = {
 }
 """What a reader types where a command asks."""
 
-PLACEHOLDER = re.compile(r"(?<![A-Za-z0-9_=])[A-Z][A-Z_]+(?![A-Za-z0-9_=])|\b[A-Z]\.[a-z]")
+PLACEHOLDER = re.compile(r"(?<![A-Za-z0-9_])[A-Z][A-Z_]+(?![A-Za-z0-9_=])|\b[A-Z]\.[a-z]")
 SYNOPSIS = re.compile(r"\.\.\.|\[|(?<=\w)\|(?=\w)")
 SERVES = re.compile(r"(?:palpebra(?: start| demo)?|server run)(?: --.*)?")
 MADE_FILE = re.compile(r'^name = "(\w+)"$', re.MULTILINE)

@@ -69,7 +69,7 @@ def test_mixed_of_anyones_table(call):
         (("mixed", "table.csv", "--rating", "rating", "--within", "A", "--item", "participant"), "as item"),
         (("mixed", "table.csv", "--rating", "ratings", "--within", "A"), "did you mean 'rating'"),
         (("ordinal", "table.csv", "--rating", "rating", "--within", "A,Q", "--item", "clip"), "'Q'"),
-        (("synthesise", "exp3", "--out", "no/such/folder.csv"), "does not exist"),
+        (("synthesise", "exp3", "--out", "table.csv/folder.csv"), "expected a folder"),
         (("synthesise", "expp3"), "did you mean 'exp"),
         (("power", "exp1", "--n", "9:3"), "first <= last"),
     ],

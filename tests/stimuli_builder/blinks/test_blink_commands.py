@@ -128,7 +128,7 @@ def test_a_decision_about_a_blink_that_is_gone_is_reported_and_kept(stimuli, ser
             "--lids: expected a name that ends in .csv or .txt, got 'l.xlsx'",
         ),
         (["--column", "gap_l", "--fps", "300", "--plot", "figure.gif"], "'gif' is not a figure format"),
-        (["--column", "gap_l", "--fps", "300", "--summary", "none/s.json"], "does not exist"),
+        (["--column", "gap_l", "--fps", "300", "--summary", "/dev/null/s.json"], "expected a folder"),
         (["--column", "gap_l", "--fps", "300", "--summary", "b.csv"], "a unique name"),
         (["--column", "gap_l", "--fps", "300", "--closed", "40"], "is not below the opening of any blink"),
         (["--column", "gap_l", "--fps", "300", "--closed", "-1"], "0 or more"),
