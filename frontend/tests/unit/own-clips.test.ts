@@ -14,6 +14,7 @@ import { clipFindings, factsOf, pictureProblems, repeatedFiles } from "../../src
 import { sizeRemark } from "../../src/admin/clips/UploadClips";
 import { languageFindings, summaryOf } from "../../src/admin/studies/Preflight";
 import { matching } from "../../src/admin/studies/StudiesPage";
+import { expectedReturn, isReturn, testAddress } from "../../src/admin/studies/SelfTest";
 import { nextStep } from "../../src/admin/studies/StatusBadge";
 import {
   declaredPattern,
@@ -236,4 +237,15 @@ describe("clips in the cells of a study", () => {
     expect(files(filled.places, filled.data)).toEqual(["rosie_slow_1.mp4", "rosie_slow_2.mp4", "rosie_fast_1.mp4", "rosie_fast_2.mp4"]);
     expect(arrangementOf(filled.places, filled.data).rest.map(({ file }) => file)).toEqual(["odd.mp4"]);
   });
+});
+
+it("the way back of a recruiter has the code, the id and any run", () => {
+  const recruiter = { kind: "sona", redirect_url: "https://x.org/a?c={code}&id={survey_code}&r={run}" };
+  const parameters = new URL(testAddress("https://here/run/T", recruiter)).searchParams;
+  const expected = expectedReturn(recruiter, "C D", parameters);
+  expect(isReturn("https://x.org/a?c=C%20D&id=selftest&r=0123abcd", expected)).toBe(true);
+  expect(isReturn("https://x.org/a?c=OTHER&id=selftest&r=0123abcd", expected)).toBe(false);
+  expect(isReturn("https://x.org/a?c=C%20D&id=selftest&r=1&more=2", expected)).toBe(false);
+  expect(expectedReturn({ kind: "prolific" }, "C", parameters)).toBe("https://app.prolific.com/submissions/complete?cc=C");
+  expect(expectedReturn({ kind: "mturk" }, "C", parameters)).toBe("");
 });

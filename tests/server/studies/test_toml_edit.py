@@ -179,9 +179,9 @@ def test_a_text_that_keeps_the_editor_busy_is_refused_before_it_is_read(text: st
 
 def test_comments_are_found_and_what_only_looks_like_one_is_not() -> None:
     text = (
-        '# first\nname = "x" # short\ntitle = "# \\" # no"\nlist = [ # in\n1]\n# it\'s\n[a] #z\nb = \'# no\'\n'
+        '# 1\nname = "x" # short\ntitle = "# \\" # no"\nlist = [ # in\n1]\n# it\'s\n[a] #z\nb = \'# no\'\n'
         '[[c]] # table\nd = """\n# no \\""" # no\n"""\ne = \'\'\'\n# no\'\'\' # yes\n'
     )
     tomllib.loads(text)
-    expected = ["# first", "# short", "# in", "# it's", "#z", "# table", "# yes"]
+    expected = ["# 1", "# short", "# in", "# it's", "#z", "# table", "# yes"]
     assert comments_of(text) == expected

@@ -172,6 +172,7 @@ function Recruitment({ detail }: { detail: Schemas["StudyDetail"] }) {
           Save
         </Button>
         {detail.recruiter !== null && <LinkForRecruiter study={name} recruiter={detail.recruiter} />}
+        {detail.recruiter !== null && <SelfTest detail={detail} />}
         {Boolean(detail.recruiter?.["signature_parameter"]) && <SigningButton study={name} />}
       </Stack>
     </Card>
@@ -240,6 +241,7 @@ function RecruiterFields({ service, texts, onChange }: FieldsProps) {
   );
 }
 
+const SelfTest = onDemand(async () => (await import("./SelfTest")).SelfTest);
 const Versions = onDemand(async () => (await import("./CompareVersions")).Versions);
 const CompareVersions = onDemand(async () => (await import("./CompareVersions")).CompareVersions);
 const PageLanguages = onDemand(async () => (await import("./Preflight")).PageLanguages);
