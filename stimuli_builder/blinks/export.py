@@ -72,7 +72,8 @@ REST_S = 0.1
 class AnimationCurve:
     """Closure of the left and right eye at `fps`, and the lower lids' motion in mm.
 
-    `blinks` names each blink with the frame of its onset.
+    `blinks` names each blink with the frame of its onset. `gaze_deg` (n, 2) is the direction of gaze to the
+    person's right and up, in degrees; None where nobody gave one.
     """
 
     fps: float
@@ -81,6 +82,7 @@ class AnimationCurve:
     lower_up_mm: Array
     lower_nasal_mm: Array
     blinks: tuple[tuple[str, float], ...]
+    gaze_deg: Array | None = None
 
 
 def make_curve(
@@ -156,17 +158,22 @@ CSV_COLUMNS = {
     "lower_up_mm": "lift of the lower lids in mm",
     "lower_nasal_mm": "slide of the lower lids toward the nose in mm",
 }
+GAZE_COLUMNS = {
+    "gaze_right_deg": "gaze to the person's right in degrees",
+    "gaze_up_deg": "gaze upward in degrees",
+}
 
 
 def to_csv(curve: AnimationCurve) -> str:
-    """One row a frame, columns as in `CSV_COLUMNS`."""
+    """One row a frame, columns as in `CSV_COLUMNS`, then the gaze if there is one."""
+    lids = [curve.left, curve.right, curve.lower_up_mm, curve.lower_nasal_mm]
+    gaze = () if curve.gaze_deg is None else curve.gaze_deg.T
     rows = [
-        f"{frame},{frame / curve.fps:.6f},{left:g},{right:g},{up:g},{nasal:g}"
-        for frame, (left, right, up, nasal) in enumerate(
-            zip(curve.left, curve.right, curve.lower_up_mm, curve.lower_nasal_mm, strict=True)
-        )
+        f"{frame},{frame / curve.fps:.6f}," + ",".join(f"{value:g}" for value in values)
+        for frame, values in enumerate(zip(*lids, *gaze, strict=True))
     ]
-    return "\n".join([",".join(CSV_COLUMNS), *rows]) + "\n"
+    columns = [*CSV_COLUMNS, *(() if curve.gaze_deg is None else GAZE_COLUMNS)]
+    return "\n".join([",".join(columns), *rows]) + "\n"
 
 
 def to_json(curve: AnimationCurve) -> str:
@@ -180,6 +187,8 @@ def to_json(curve: AnimationCurve) -> str:
         "lower_up_mm": curve.lower_up_mm.tolist(),
         "lower_nasal_mm": curve.lower_nasal_mm.tolist(),
     }
+    if curve.gaze_deg is not None:
+        content |= dict(zip(GAZE_COLUMNS, curve.gaze_deg.T.tolist(), strict=True))
     return json.dumps(content, indent=1) + "\n"
 
 
@@ -203,14 +212,33 @@ BLEND_SHAPES = (
 
 
 def to_arkit(curve: AnimationCurve) -> str:
-    """EyeBlinkLeft and EyeBlinkRight carry the closures, other shapes stay 0; time is HH:MM:SS:FF.mmm."""
-    left, right = BLEND_SHAPES.index("EyeBlinkLeft"), BLEND_SHAPES.index("EyeBlinkRight")
+    """EyeBlink* carry the closures, EyeLook* the gaze, other shapes stay 0; time is HH:MM:SS:FF.mmm."""
+    tracks = {"EyeBlinkLeft": curve.left, "EyeBlinkRight": curve.right} | _eye_looks(curve.gaze_deg)
+    moved = {BLEND_SHAPES.index(name): track for name, track in tracks.items()}
     lines = [",".join(["Timecode", "BlendShapeCount", *BLEND_SHAPES])]
     for frame in range(curve.left.size):
         values = ["0"] * len(BLEND_SHAPES)
-        values[left], values[right] = f"{curve.left[frame]:.6f}", f"{curve.right[frame]:.6f}"
+        for index, track in moved.items():
+            values[index] = f"{track[frame]:.6f}"
         lines.append(",".join([timecode(frame, curve.fps), str(len(BLEND_SHAPES)), *values]))
     return "\n".join(lines) + "\n"
+
+
+FULL_LOOK_DEG = 35.0
+"""Gaze at which an ARKit shape of the eyes is 1: about as far as eyes turn without the head."""
+
+
+def _eye_looks(gaze_deg: Array | None) -> dict[str, Array]:
+    """Shapes of both eyes' gaze: to the person's right is out for the right eye, and in for the left."""
+    if gaze_deg is None:
+        return {}
+    right, up = np.clip(gaze_deg.T / FULL_LOOK_DEG, -1.0, 1.0)
+    to_right, to_left = np.maximum(right, 0.0), np.maximum(-right, 0.0)
+    looks = {"EyeLookOutRight": to_right, "EyeLookInLeft": to_right}
+    looks |= {"EyeLookInRight": to_left, "EyeLookOutLeft": to_left}
+    for side in ("Left", "Right"):
+        looks[f"EyeLookUp{side}"], looks[f"EyeLookDown{side}"] = np.maximum(up, 0.0), np.maximum(-up, 0.0)
+    return looks
 
 
 def timecode(frame: int, fps: float) -> str:

@@ -52,6 +52,15 @@ def performance(
     lively: Annotated[
         float | None, typer.Option(help="From 0 (calm: half as many blinks) to 1 (lively: twice as many).")
     ] = None,
+    gaze: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "CSV of the gaze (time_s, right_deg, up_deg): lids follow it, large shifts bring blinks, and "
+                "csv, json and arkit write it, too."
+            )
+        ),
+    ] = None,
     target: Annotated[str, typer.Option(help="Object (Blender) or node (Maya) with the shapes.")] = "",
     left: Annotated[str, typer.Option(help="Name of the left eye's shape or attribute.")] = "eyeBlinkLeft",
     right: Annotated[str, typer.Option(help="Name of the right eye's shape or attribute.")] = "eyeBlinkRight",
@@ -67,6 +76,8 @@ def performance(
       stimuli performance --duration 60 --state reading --out reading.json --format json
 
       stimuli performance --duration 20 --blinks-at onsets.csv --complete 1 --out given.csv
+
+      stimuli performance --duration 20 --gaze gaze.csv --format arkit --out looks.csv
 
       stimuli performance speech.wav --lively 0.8 --fps 25 --format liveportrait --out eyes.csv
     """
@@ -87,6 +98,7 @@ def performance(
             blinks_at,
             complete,
             lively,
+            gaze,
             CurveTarget(target, left, right),
         )
     )

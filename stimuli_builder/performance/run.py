@@ -1,19 +1,21 @@
 """The command `stimuli performance`: speech in, lid curves out."""
 
 import shlex
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import cast, get_args
+from typing import NamedTuple, cast, get_args
 
 import numpy as np
 import webvtt
+from numpy.typing import NDArray
 from rich.console import Console
 from webvtt.models import Caption
 
 from blink_engine import Event, Performance, StateName, default_parameters, perform
 from blink_engine.laws import Law
 from blink_engine.parameters import Parameters
+from blink_engine.performance import GAZE_CLOSURE_MAX
 from blink_engine.speech import Speech, join_speech, seed_of_speaker, speech_events, speech_states
 from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import check_targets, whole_text
@@ -172,6 +174,7 @@ class PerformanceJob:
     blinks_at: Path | None = None
     complete: float | None = None
     lively: float | None = None
+    gaze: Path | None = None
     target: CurveTarget = field(default_factory=CurveTarget)
 
 
@@ -187,18 +190,23 @@ def write_performance(job: PerformanceJob) -> None:
             f"expected at most {MAX_FRAMES} frames, got {duration_s * job.fps:.0f}; lower --duration or --fps"
         )
     onsets = [] if job.blinks_at is None else _onsets(job.blinks_at, duration_s)
+    gaze = None if job.gaze is None else read_gaze(job.gaze, duration_s)
+    shifts = [] if gaze is None else gaze_shifts(gaze)
     parameters = _parameters(job, state)
     done = perform(
         duration_s,
         job.fps,
         seed=job.seed if job.speaker is None else seed_of_speaker(job.seed, job.speaker),
         state=state,
-        events=[Event("blink", one) for one in onsets] if onsets else speech_events(stretches),
+        events=[Event("blink", one) for one in onsets] if onsets else [*speech_events(stretches), *shifts],
         changes=speech_states(stretches, state) if stretches else (),
         parameters=parameters,
         ends_open=True,
     )
-    text = write_curve(job.format_name, animation_curve(done), job.target)
+    curve = animation_curve(done)
+    if gaze is not None:
+        curve = looking(curve, gaze, parameters.gaze_closure_per_deg)
+    text = write_curve(job.format_name, curve, job.target)
     with whole_text(job.out) as stream:
         stream.write(text)
     spoken_s = sum(one.end_s - one.start_s for one in stretches)
@@ -255,6 +263,75 @@ def _onsets(path: Path, duration_s: float) -> list[float]:
     return onsets
 
 
+# Where the eyes look: lids follow the gaze, and blinks come with large shifts of it.
+
+GAZE_DEG_MAX = 60.0
+SHIFT_DEG_PER_S = 80.0
+"""Eyes that turn faster make a saccade; pursuit of what moves is slower."""
+
+
+class GazeTrack(NamedTuple):
+    """Direction of gaze at `time_s` (n,): `deg` (n, 2) to the person's right and up, in degrees."""
+
+    time_s: NDArray[np.float64]
+    deg: NDArray[np.float64]
+
+
+def read_gaze(path: Path, duration_s: float) -> GazeTrack:
+    """Read a CSV with time_s and right_deg, up_deg or both.
+
+    Raises
+    ------
+    InputError
+        A column is missing, a value is not a number, times do not rise, or nobody can look that far.
+    """
+    table = named_rows(path)
+    given = [name for name in ("right_deg", "up_deg") if name in table.header]
+    if "time_s" not in table.header or not given:
+        raise InputError(
+            f"{path}: expected the columns time_s, right_deg and up_deg, got {', '.join(table.header)}"
+        )
+    try:
+        values = np.array([[float(row[name]) for name in ("time_s", *given)] for _, row in table.rows])
+    except ValueError as error:
+        raise InputError(f"{path}: expected numbers: {error}") from error
+    if not len(values) or not np.isfinite(values).all() or not (np.diff(values[:, 0]) > 0).all():
+        raise InputError(f"{path}: expected rising times and finite angles in every row")
+    if values[0, 0] > duration_s or values[-1, 0] < 0:
+        raise InputError(f"{path}: expected times from 0 to {duration_s:g} s; correct them or --duration")
+    if np.abs(values[:, 1:]).max() > GAZE_DEG_MAX:
+        raise InputError(f"{path}: expected angles up to {GAZE_DEG_MAX:g} degrees; eyes turn no further")
+    deg = np.zeros((len(values), 2))
+    for column, name in enumerate(("right_deg", "up_deg")):
+        if name in given:
+            deg[:, column] = values[:, 1 + given.index(name)]
+    return GazeTrack(values[:, 0], deg)
+
+
+def gaze_shifts(gaze: GazeTrack) -> list[Event]:
+    """The saccades of a track: where they begin, and how far each leads."""
+    steps = np.hypot(*np.diff(gaze.deg, axis=0).T)
+    fast = np.r_[False, steps / np.diff(gaze.time_s) > SHIFT_DEG_PER_S, False]
+    begins, ends = (np.flatnonzero(fast[1:] & ~fast[:-1]), np.flatnonzero(~fast[1:] & fast[:-1]))
+    return [
+        Event("gaze_shift", float(gaze.time_s[begin]), float(np.hypot(*(gaze.deg[end] - gaze.deg[begin]))))
+        for begin, end in zip(begins, ends, strict=True)
+        if gaze.time_s[begin] >= 0
+    ]
+
+
+def looking(curve: AnimationCurve, gaze: GazeTrack, closure_per_deg: float) -> AnimationCurve:
+    """The curve with the gaze at each frame and lids that follow it.
+
+    Eyes that look up would open wider than a shape of a blink can show: the lids then stay.
+    """
+    at = np.arange(curve.left.size) / curve.fps
+    deg = np.stack([np.interp(at, gaze.time_s, column) for column in gaze.deg.T], axis=1)
+    covered = np.clip(-closure_per_deg * deg[:, 1], 0.0, GAZE_CLOSURE_MAX)
+    left, right = (np.round(covered + (1 - covered) * lid, 6) for lid in (curve.left, curve.right))
+    return replace(curve, left=left, right=right, gaze_deg=np.round(deg, 4))
+
+
 def animation_curve(done: Performance) -> AnimationCurve:
     """Return a performance as the curve that the exports write, the lower lid in mm."""
     return AnimationCurve(
@@ -280,6 +357,8 @@ def _checked(job: PerformanceJob) -> StateName:
             raise InputError(f"expected {option} from 0 to 1, got {share:g}")
     if job.blinks_at is not None and (job.rate is not None or job.lively is not None):
         raise InputError("--blinks-at gives every blink; remove --rate and --lively")
+    if job.gaze is not None and job.blinks_at is not None:
+        raise InputError("--blinks-at gives every blink, and --gaze brings others; remove one of them")
     if job.state not in get_args(StateName):
         states = list(get_args(StateName))
         raise InputError(f"unknown --state '{job.state}'{did_you_mean(job.state, states)}")

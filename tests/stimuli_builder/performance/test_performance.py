@@ -258,6 +258,59 @@ def test_lively_eyes_blink_four_times_as_often_as_calm_ones(tmp_path: Path) -> N
     assert counts[2] / counts[0] == pytest.approx(4, rel=0.35)
 
 
+def _gaze_file(path: Path) -> Path:
+    """Ten shifts of 40 degrees to the right or back, every 2 s; from 20 s on a slow look down by 30 degrees."""
+    times = np.arange(0, 30, 0.01)
+    right = np.zeros(times.size)
+    for number, begin in enumerate(np.arange(1, 20, 2)):
+        right += (1 if number % 2 == 0 else -1) * 40 * np.clip((times - begin) / 0.1, 0, 1)
+    up = -30 * np.clip((times - 20) / 2, 0, 1)
+    lines = [f"{t:.2f},{x:g},{y:g}" for t, x, y in zip(times, right, up, strict=True)]
+    path.write_text("\n".join(["time_s,right_deg,up_deg", *lines, ""]), encoding="utf-8")
+    return path
+
+
+def test_lids_follow_a_gaze_whose_large_shifts_bring_blinks(tmp_path: Path) -> None:
+    options = ["--gaze", str(_gaze_file(tmp_path / "gaze.csv")), "--duration", "30", "--fps", "100"]
+    calm = ["--rate", "0.1", "--complete", "1"]
+    curves = _blinks(tmp_path, *options, *calm)
+    assert curves["gaze_right_deg"][200] == pytest.approx(40)
+    first = np.minimum(*(_onsets_in(curves[f"closure_{eye}"], 100) for eye in ("left", "right")))
+    # Evinger et al. (1994): 97% of shifts above 33 degrees; each blink begins with its shift.
+    shifts = np.arange(1, 20, 2)
+    answered = [bool((np.abs(first - shift) < 0.1).any()) for shift in shifts]
+    assert sum(answered) >= 8
+    assert curves["closure_left"][-1] == pytest.approx(0.016 * 30, abs=0.01)
+    looks = tmp_path / "looks.csv"
+    done = CliRunner().invoke(app, ["performance", "--out", str(looks), "--format", "arkit", *options, *calm])
+    assert done.exit_code == 0, done.output
+    shapes = np.genfromtxt(looks, delimiter=",", names=True, dtype=None, encoding="utf-8")
+    assert shapes["EyeLookOutRight"][150] == shapes["EyeLookInLeft"][150] == 1
+    assert shapes["EyeLookInRight"][150] == shapes["EyeLookUpLeft"][150] == 0
+    assert shapes["EyeLookDownRight"][-1] == pytest.approx(30 / 35, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        ("time_s,x\n1,2\n", [], "expected the columns time_s, right_deg and up_deg, got time_s, x"),
+        ("time_s,up_deg\n1,high\n", [], "expected numbers"),
+        ("time_s,up_deg\n2,1\n1,1\n", [], "expected rising times"),
+        ("time_s,up_deg\n0,1\n1,90\n", [], "expected angles up to 60 degrees"),
+        ("time_s,up_deg\n99,1\n", [], "expected times from 0 to 10 s"),
+        ("time_s,up_deg\n1,1\n", ["--blinks-at", "given.csv"], "remove one of them"),
+    ],
+)
+def test_a_gaze_that_cannot_be_is_one_line(tmp_path: Path, text: str, options: list[str], said: str) -> None:
+    (tmp_path / "gaze.csv").write_text(text, encoding="utf-8")
+    out = tmp_path / "out.csv"
+    arguments = ["performance", "--gaze", str(tmp_path / "gaze.csv"), "--duration", "10", "--out", str(out)]
+    done = CliRunner().invoke(app, [*arguments, *options])
+    assert isinstance(done.exception, InputError)
+    assert said in str(done.exception)
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(("name", "opened"), [("liveportrait", 0.3), ("ditto", 0.9)])
 def test_eye_ratios_are_read_by_numpy(tmp_path: Path, name: str, opened: float) -> None:
     curve = AnimationCurve(25, *np.array([[0, 0.5, 1], [0, 0, 1], [0, 0, 0], [0, 0, 0]]), ())
