@@ -259,7 +259,7 @@ def test_lively_eyes_blink_four_times_as_often_as_calm_ones(tmp_path: Path) -> N
 
 
 def _gaze_file(path: Path) -> Path:
-    """Ten shifts of 40 degrees to the right or back, every 2 s; from 20 s on a slow look down by 30 degrees."""
+    """Ten shifts of 40 degrees to the right or back, every 2 s; from 20 s a slow look down by 30 degrees."""
     times = np.arange(0, 30, 0.01)
     right = np.zeros(times.size)
     for number, begin in enumerate(np.arange(1, 20, 2)):
