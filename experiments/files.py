@@ -30,13 +30,16 @@ def check_target(path: Path) -> None:
 
 def check_folder(folder: Path) -> None:
     """Refuse a folder that cannot be written to or created, before the work begins; nothing is created."""
-    ancestor = folder
-    while not ancestor.exists() and ancestor != ancestor.parent:
-        ancestor = ancestor.parent
+    ancestor = existing_part(folder)
     if not ancestor.is_dir():
         raise InputError(f"{folder}: expected a folder, but {ancestor} is a file")
     if not os.access(ancestor, os.W_OK):
         raise InputError(f"{folder}: the folder {ancestor} is not writable")
+
+
+def existing_part(path: Path) -> Path:
+    """A path, or the nearest of the folders above it that exists."""
+    return next((one for one in (path, *path.parents) if one.exists()), path)
 
 
 def check_targets(outputs: Iterable[Path | None], inputs: Iterable[Path | None] = ()) -> None:

@@ -11,6 +11,7 @@ import typer
 
 from experiments.command_line import EXTRAS, install_line
 from experiments.errors import InputError
+from experiments.files import existing_part
 from palpebra.conflicts import foreign_packages
 from palpebra.folders import Folder, data_folder, use_folder
 
@@ -93,7 +94,7 @@ def _backed_up(place: Path, file: Path | None) -> Path:
     needed = sum(
         path.stat().st_size for path in place.rglob("*") if path.is_file() and "backups" not in path.parts
     )
-    free = shutil.disk_usage(file.resolve().parent).free
+    free = shutil.disk_usage(existing_part(file.resolve().parent)).free
     if free < needed:
         raise InputError(
             f"{file}: a backup needs {needed / 1e6:.0f} MB, but only {free / 1e6:.0f} MB are free"

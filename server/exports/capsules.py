@@ -212,6 +212,7 @@ def build_capsule(
         There is no such data series.
     """
     made = now().date().isoformat()
+    target.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".capsule-", dir=target.parent) as temporary:
         folder, work = Path(temporary) / "capsule", Path(temporary) / "work"
         folder.mkdir()

@@ -103,6 +103,9 @@ def test_upgrade_backs_up_first_and_names_both(tmp_path: Path) -> None:
     (kept,) = (data / "backups").glob("palpebra-*.tar")
     assert str(kept) in done.stdout
     assert "uv tool install --force" in done.stdout
+    elsewhere = tmp_path / "new" / "folder" / "monday.tar"
+    done = palpebra("backup", str(elsewhere), "--folder", str(data), folder=tmp_path)
+    assert (done.returncode, elsewhere.is_file()) == (0, True), done.stderr
 
 
 def test_database_of_a_newer_version_is_refused(tmp_path: Path) -> None:
