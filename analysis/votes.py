@@ -71,6 +71,7 @@ class Standard:
 
     def check(self) -> None:
         """Refuse options that do not belong together; InputError says what to add or remove."""
+        # Two methods need the reference's column, each for another purpose.
         needs = {"acr-hr": ("--reference", self.reference), "dscqs": ("--reference", self.reference)}
         needs["ccr"] = ("--first", self.first)
         name, given = needs.get(self.method, ("", "none"))
@@ -108,6 +109,7 @@ def differential_scores(scores: Array, references: Codes, highest: float, crush:
     references : (items,) int64
         Index of each item's reference; -1 for references themselves, whose scores are NaN.
     """
+    # Against a person's own vote on the reference, not the mean: people use scales differently.
     of_reference = np.where(references >= 0, scores[:, np.maximum(references, 0)], np.nan)
     differences = scores - of_reference + highest
     if crush:
@@ -215,6 +217,7 @@ def bt500_counts(scores: Array) -> tuple[Codes, Codes, NDArray[np.bool_]]:
     seen = np.isfinite(scores)
     n = seen.sum(axis=0)
     means = np.divide(np.nansum(scores, axis=0), n, out=np.zeros(scores.shape[1]), where=n > 0)
+    # From here on missing votes are NaN, and leave every sum as it is.
     centred = scores - means
     squares = np.nansum(centred**2, axis=0)
     varied = squares > 0
@@ -226,7 +229,9 @@ def bt500_counts(scores: Array) -> tuple[Codes, Codes, NDArray[np.bool_]]:
     # Where nothing varies the limit is 0, which every vote reaches.
     above = np.sum((centred >= limit) & varied, axis=1)
     below = np.sum((centred <= -limit) & varied, axis=1)
+    # A vote is counted against the person's own number of votes: few may be far by chance.
     share = (above + below) / np.maximum(seen.sum(axis=1), 1)
+    # Somebody whose far votes are all on one side is strict or mild, and not unreliable.
     lean = np.abs(above - below) / np.maximum(above + below, 1)
     return above, below, np.asarray((share > FAR_SHARE) & (lean < LEAN_MAX))
 
@@ -424,6 +429,7 @@ def _conditions(
             f"expected {CONDITIONS_MIN} conditions or more in '{column}', got {len(names)}; omit --condition"
         )
     of_item = np.zeros(len(items), dtype=np.int64)
+    # The last row of an item wins, and the next line finds rows that say otherwise.
     of_item[which] = codes
     if (different := of_item[which] != codes).any():
         item = items[int(which[different][0])]
@@ -437,6 +443,7 @@ def _against_references(votes: Votes, which: Codes, named: NDArray[Any], standar
     """Each person's votes against that person's vote on the hidden reference of the item."""
     references = np.full(len(votes.items), -1, dtype=np.int64)
     for index, name in enumerate(votes.items):
+        # An empty cell, or the item's own name, marks a reference.
         given = {text for text in np.unique(named[which == index]) if text not in ("", name)}
         if len(given) > 1:
             told = ", ".join(sorted(given)[:NAMED_MAX])
@@ -451,14 +458,17 @@ def _against_references(votes: Votes, which: Codes, named: NDArray[Any], standar
             "reference's item in the rows of the other items"
         )
     scores = differential_scores(votes.scores, references, standard.highest or 0.0, standard.crush)
+    # Who did not rate the reference has no score on its items: the vote says nothing alone.
     lost = np.isfinite(votes.scores) & ~np.isfinite(scores) & (references >= 0)
     decisions = list(votes.decisions)
     if lost.any():
         told = names_where(votes.people, np.any(lost, axis=1))
         decisions.append(f"{int(lost.sum())} votes excluded, without a vote on the reference by {told}")
+    # References themselves are no items of the result.
     kept = (references >= 0) & np.isfinite(scores).any(axis=0)
     people = np.any(np.isfinite(scores[:, kept]), axis=1)
     scores = scores[np.ix_(people, kept)]
+    # Each difference counts once, whatever number of votes it was the mean of.
     there = np.isfinite(scores)
     return Votes(
         scores,

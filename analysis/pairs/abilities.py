@@ -93,6 +93,7 @@ class ItemFactors:
                 raise InputError(
                     f"{self.source}: there is no row for item '{item}'; every compared item needs one"
                 )
+        # Treatment coding: the first level of a factor is its reference, and has no column.
         columns = [
             [float(self.levels[item][self.factors.index(factor)] == level) for item in items]
             for factor in self.factors
@@ -135,7 +136,9 @@ def read_item_factors(path: Path, levels: Sequence[str] = ()) -> ItemFactors:
     for name in names:
         if names.count(name) > 1:
             raise InputError(f"{path.name}: item '{name}' has two rows; give each item one")
+    # Every row counts here: an item without comparisons still gives its level a place.
     everywhere = np.ones(len(rows), dtype=np.bool_)
+    # The order in the file first, so that an order given by --levels replaces it.
     orders = {name: names_in_order(table.columns[name], everywhere) for name in table.header[1:]}
     orders |= given_orders(orders, levels)[0]
     of_items = {str(row[0]): tuple(row[1:]) for row in rows}
@@ -172,7 +175,9 @@ def factor_tests(
                 float(stats.chi2.sf(max(0.0, chi2), len(names) - 1)),
             )
         )
+    # Free abilities are the largest model of these items: what they fit better the factors miss.
     free = fit(Model(model.method, free_abilities(len(items)), model.order_effect), counts)
+    # No df where the factors have as many coefficients as there are items to tell apart.
     chi2, df = 2 * (free.log_likelihood - whole.log_likelihood), len(items) - 1 - model.design.shape[1]
     p = float(stats.chi2.sf(max(0.0, chi2), df)) if df > 0 else float("nan")
     return (*tests, FactorTest("lack of fit", "", (), (), (), chi2, df, p))
@@ -306,9 +311,11 @@ def goodness_of_fit(model: Model, counts: Counts, fitted: Fit) -> Goodness:
 
 def _unordered(counts: Counts, values: Array) -> Array:
     """Add up both orders of a pair (m, o): the item that comes first in the alphabet as the left one."""
+    # A pair shown as b-a is the pair a-b with its winner turned round.
     swapped = counts.left > counts.right
     turned = values.copy()
     turned[swapped, LEFT], turned[swapped, RIGHT] = values[swapped, RIGHT], values[swapped, LEFT]
+    # Both orders of a pair now have one key.
     low, high = np.minimum(counts.left, counts.right), np.maximum(counts.left, counts.right)
     _, index = np.unique(np.stack([low, high]), axis=1, return_inverse=True)
     total = np.zeros((int(index.max()) + 1, values.shape[1]))
@@ -363,6 +370,7 @@ def fit_abilities(
         )
     ties = method in TIED
     counts = count_outcomes(comparisons, ties=ties)
+    # Without factors every item but the first has an ability of its own.
     design = free_abilities(len(comparisons.items)) if factors is None else factors.design(comparisons.items)
     model = Model(method, design, order_effect)
     fitted = fit(model, counts, firth=firth)
@@ -370,17 +378,21 @@ def fit_abilities(
     if crossed:
         data = crossed_pairs(comparisons, model, items_vary=factors is not None)
         fitted, effects = fit_crossed(data, fitted)
+    # Rows of all parameters, with zeros for what is not an ability (order, ties).
     full = np.zeros((len(comparisons.items), model.names))
     full[:, : design.shape[1]] = design
+    # Random effects of raters already allow for their clustering.
     robust = None if crossed else _robust(comparisons, model, fitted, counts)
     pairs = FittedPairs(comparisons, model, counts, fitted, robust, firth)
     raters = len(comparisons.participants)
     k, extra = len(comparisons.items), np.eye(model.names)[design.shape[1] :]
+    # Limits of differences are not those of abilities: two abilities share the reference item's error.
     differences = [full[first] - full[second] for first, second in combinations(range(k), 2)]
     limits, notes = interval_limits(pairs, np.stack([*full, *differences, *extra]), intervals, samples)
     always = separated_items(comparisons) if firth else None
     if always:
         notes.insert(0, f"{always}: only Firth's penalty keeps the ability finite")
+    # Limits come in the order in which they were asked for: items, pairs, further parameters.
     of_pairs = limits[k : len(limits) - len(extra)]
     ranks = rank_limits(k, of_pairs) if intervals == "anytime" else None
     tie = _parameter(fitted, -1, limits) if ties else None
@@ -450,8 +462,10 @@ def _items(
     limits: Array,
     rank_ends: list[tuple[int, int]] | None,
 ) -> tuple[Item, ...]:
+    # The first item is 0 by definition, without a standard error.
     abilities = full @ fitted.parameters
     standard = np.sqrt(np.clip(np.diag(full @ fitted.covariance @ full.T), 0.0, None))
+    # Against the mean of all items no item is special, and the first has an error, too.
     centring = full - full.mean(axis=0)
     centred = np.sqrt(np.clip(np.diag(centring @ fitted.covariance @ centring.T), 0.0, None))
     spread = None if robust is None else np.sqrt(np.clip(np.diag(full @ robust @ full.T), 0.0, None))
@@ -483,6 +497,7 @@ def _two_sided(estimate: float, se: float) -> float:
 def _record(comparisons: Comparisons, item: int) -> tuple[int, int, int]:
     on_left, on_right = comparisons.left == item, comparisons.right == item
     for_left, for_right = comparisons.outcome == LEFT, comparisons.outcome == RIGHT
+    # Counted from the comparisons, not the model: a reader can check them in the file.
     won = int(np.sum((on_left & for_left) | (on_right & for_right)))
     lost = int(np.sum((on_left & for_right) | (on_right & for_left)))
     return won, lost, int(np.sum(on_left | on_right)) - won - lost
@@ -492,6 +507,8 @@ def _robust(comparisons: Comparisons, model: Model, fitted: Fit, counts: Counts)
     """The sandwich covariance, raters as clusters; None without raters to tell apart."""
     if comparisons.participant is None or len(comparisons.participants) < 2:
         return None
+    # The score of a comparison depends only on its pair and outcome; raters differ in how often they gave
+    # which.
     gradients = outcome_gradients(model, counts, fitted).reshape(-1, model.names)
     clusters = np.asarray(count_by_rater(comparisons, counts) @ gradients, dtype=np.float64)
     return sandwich(fitted, clusters)
@@ -506,6 +523,7 @@ def _contrasts(
         contrast = full[first] - full[second]
         se = float(np.sqrt(max(0.0, contrast @ fitted.covariance @ contrast)))
         difference = float(contrast @ fitted.parameters)
+        # The reference against itself, or two items that the factors do not tell apart, have no error.
         z = difference / se if se > 0 else float("nan")
         rows.append((items[first], items[second], difference, se, z, _two_sided(difference, se)))
         clustered.append(_clustered(difference, contrast, robust, len(comparisons.participants)))
@@ -534,6 +552,7 @@ def _with_equivalence(
 
 def _holm(p: list[float | None]) -> list[float | None]:
     """Those that there are, corrected for their number."""
+    # Holm orders the p values that exist; others keep their place.
     told = [value for value in p if value is not None]
     corrected = iter(holm(np.array(told)).tolist() if told else [])
     return [None if value is None else next(corrected) for value in p]
@@ -545,6 +564,7 @@ def _clustered(
     """The standard error with raters as clusters and its p; None without raters, p None without variance."""
     if robust is None:
         return None, None
+    # Rounding may leave a variance slightly below zero.
     se = float(np.sqrt(max(0.0, float(contrast @ robust @ contrast))))
     return se, float(2 * stats.t.sf(abs(difference) / se, raters - 1)) if se > 0 else None
 

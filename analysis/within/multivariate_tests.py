@@ -62,17 +62,23 @@ def four_statistics(eigenvalues: Floats, responses: int, df_hypothesis: int, df_
 
     Source: Rencher & Christensen (2012), chapter 6; the forms are those of R's `summary.manova`.
     """
+    # The letters are those of the notes above and of the textbook, so that each line can be compared.
     p, r, nu = responses, df_hypothesis, df_error
     s, m, n = min(p, r), (abs(p - r) - 1) / 2, (df_error - responses - 1) / 2
     width, depth = 2 * m + s + 1, 2 * n + s + 1
+    # A direction with eigenvalue lambda explains lambda / (1 + lambda) of what varies along it.
     shares = eigenvalues / (1 + eigenvalues)
     pillai, trace = float(shares.sum()), float(eigenvalues.sum())
+    # A product of many factors near 0 would underflow: the logarithms are added instead.
     lamb, root = float(np.exp(-np.log1p(eigenvalues).sum())), float(eigenvalues.max())
     # s - V summed as 1 / (1 + lambda): no digits are lost where V is close to s
     rest = float((1 / (1 + eigenvalues)).sum()) + (s - len(eigenvalues))
+    # For p = r = 1 or a 2 x 1 table the root of Rao's formula is 0 / 0; its power is 1 then.
     square = p * p + r * r - 5
     power = float(np.sqrt((p * p * r * r - 4) / square)) if square > 0 else 1.0
+    # Rao's second df; it need not be a whole number.
     wilks_df = (nu - (p - r + 1) / 2) * power - (p * r - 2) / 2
+    # Roy's root has no exact F with several eigenvalues: this one is too large, and p too small.
     larger = max(p, r)
     return FourStatistics(
         pillai=_with_p(pillai, depth / width * pillai / rest, s * width, s * depth),
@@ -104,6 +110,7 @@ def exact_statistics(
     :math:`F = \lambda (\nu - p + 1) / \max(p, r)` on :math:`\max(p, r), \nu - p + 1`: every form of
     `four_statistics` with s = 1.
     """
+    # With one eigenvalue the four statistics are functions of each other, and so is their F.
     df1, df2 = np.maximum(responses, df_hypothesis), df_error - responses + 1
     f_value = eigenvalues * df2 / df1
     columns = (
@@ -123,6 +130,7 @@ def exact_statistics(
 
 
 def _with_p(value: float, f_value: float, df_effect: float, df_error: float) -> Statistic:
+    # Fewer participants than contrasts leave no df: the statistic stands, its F and p do not.
     known = df_error > 0
     p_value = float(special.fdtrc(df_effect, df_error, f_value)) if known else float("nan")
     return Statistic(value, f_value if known else float("nan"), float(df_effect), float(df_error), p_value)
@@ -190,6 +198,7 @@ class MultivariateTests:
             else (one.pillai.f_value, one.pillai.df_effect, one.pillai.df_error)
             for one in four
         ]
+        # All intervals are searched at once: one after another takes most of the time of an ANOVA.
         own = SizeIntervals(first, self._confidence)
         return [
             None if one is None else _one_test(one, h, self._univariate if h.error.q == 1 else own, at)
@@ -201,8 +210,10 @@ def _whitening(error: ErrorStratum) -> Floats | None:
     """A matrix (q, q) that turns scores into such with E = I; None where there is none."""
     if error.reason is not None:
         return None
+    # One contrast needs no decomposition.
     if error.q == 1:
         return np.array([[error.ss**-0.5]])
+    # None where scores are collinear within rounding: E has no inverse, and there is no test.
     scaled = scaled_svd(error.residual)
     if scaled is None:
         return None
@@ -212,7 +223,9 @@ def _whitening(error: ErrorStratum) -> Floats | None:
 
 def _eigenvalues(directed: Floats, whiten: Floats) -> Floats:
     """Eigenvalues (s,) of E^-1 H of a hypothesis."""
+    # With E = I the eigenvalues of E^-1 H are the squared singular values of the directions of H.
     whitened = directed @ whiten
+    # A single row or column has one eigenvalue: its squared length.
     if 1 in whitened.shape:
         return np.array([np.vdot(whitened, whitened)])
     roots: Floats = np.asarray(np.linalg.svd(whitened, compute_uv=False), dtype=np.float64)
@@ -221,6 +234,7 @@ def _eigenvalues(directed: Floats, whiten: Floats) -> Floats:
 
 def _four_statistics(hypotheses: Sequence[Hypothesis]) -> list[FourStatistics | None]:
     """The statistics of each effect that has them; those with one exact F are computed together."""
+    # Effects that share an error term share its decomposition.
     whiten = {
         error.members: _whitening(error) for error in {h.error.members: h.error for h in hypotheses}.values()
     }
@@ -250,6 +264,7 @@ def _one_test(
         df_effect=round(first.df_effect),
         df_error=round(first.df_error),
         p_value=first.p_value,
+        # Pillai's V is at most s, the number of eigenvalues: V / s lies between 0 and 1.
         eta_sq_partial=first.value / smaller,
         exact=smaller == 1,
         statistics=four,
