@@ -464,7 +464,7 @@ def _against_references(votes: Votes, which: Codes, named: NDArray[Any], standar
     if lost.any():
         told = names_where(votes.people, np.any(lost, axis=1))
         decisions.append(f"{int(lost.sum())} votes excluded, without a vote on the reference by {told}")
-    # References themselves are no items of the result.
+    # References themselves do not appear in the result.
     kept = (references >= 0) & np.isfinite(scores).any(axis=0)
     people = np.any(np.isfinite(scores[:, kept]), axis=1)
     scores = scores[np.ix_(people, kept)]

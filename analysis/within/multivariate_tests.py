@@ -130,7 +130,7 @@ def exact_statistics(
 
 
 def _with_p(value: float, f_value: float, df_effect: float, df_error: float) -> Statistic:
-    # Fewer participants than contrasts leave no df: the statistic stands, its F and p do not.
+    # Fewer participants than contrasts leave no df: only the statistic is known.
     known = df_error > 0
     p_value = float(special.fdtrc(df_effect, df_error, f_value)) if known else float("nan")
     return Statistic(value, f_value if known else float("nan"), float(df_effect), float(df_error), p_value)
