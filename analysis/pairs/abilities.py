@@ -370,7 +370,7 @@ def fit_abilities(
         )
     ties = method in TIED
     counts = count_outcomes(comparisons, ties=ties)
-    # Without factors every item but the first has an ability of its own.
+    # Without factors every item but the first has a separate ability.
     design = free_abilities(len(comparisons.items)) if factors is None else factors.design(comparisons.items)
     model = Model(method, design, order_effect)
     fitted = fit(model, counts, firth=firth)

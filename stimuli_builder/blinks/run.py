@@ -70,6 +70,7 @@ def check_curve(path: Path | None, format_name: str) -> None:
     if path is None:
         return
     endings, ending = CURVES[format_name], path.suffix.lower()
+    # A table saved as .py is more likely a forgotten --curve-format than a wish.
     other = next((name for name, of_format in CURVES.items() if ending in of_format), None)
     if ending not in endings and other is not None:
         raise InputError(
@@ -104,9 +105,11 @@ def recorded_curve(eyes: Sequence[EyeBlinks], closed: float | None = None) -> An
         columns = ", ".join(f"'{eye.series.column}'" for eye in eyes)
         raise InputError(f"no blink in {columns}, so its closed level is unknown: add --closed")
     left, right = eyes[0], eyes[-1]
+    # Columns may come in any order; a curve has left and right.
     if len(eyes) == 2 and eye_of(left.series.column) == "right":
         left, right = right, left
     blinks = [(f"blink {b.number}", b.onset_s * left.series.fps) for b in left.blinks or right.blinks]
+    # A recording has one track of lower lids, the mean of both eyes.
     lower = left.series
     return AnimationCurve(
         fps=left.series.fps,
@@ -129,6 +132,7 @@ def _motion(place_mm: Array | None, count: int) -> Array:
     """Motion of the lower lid relative to its usual place; empty without a track."""
     if place_mm is None or not np.isfinite(place_mm).any():
         return np.zeros(count)
+    # Relative to the median, since most frames are open: its usual place is where the lid rests.
     return _filled(place_mm - np.nanmedian(place_mm))
 
 
@@ -188,6 +192,7 @@ class MoreOutputs:
             return []
         table = read_table(source)
         scale = self._scale(table, eyes, source)
+        # A wrong scale spoils every figure in mm, so it is said on the terminal and in the report.
         doubts = [doubt for eye in eyes if (doubt := scale_doubt(eye.series, scale))]
         for doubt in doubts:
             sys.stderr.write(f"warning: {doubt}\n")
@@ -238,6 +243,7 @@ def _write_text(path: Path, text: str) -> None:
 def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
     """What a track says about its frames, and unlikely rates."""
     lines = [*without_blinks(eyes), *rate_doubts(eyes), *eyes[0].series.notes]
+    # Only tracks of this program have these columns; other tables are read without them.
     lost = int((table["status"] == "lost").sum()) if "status" in table.columns else 0
     if lost:
         lines.append(f"{lost:,} of {len(table):,} frames are lost")
@@ -274,10 +280,12 @@ class BlinksJob:
 
 def run_blinks(job: BlinksJob) -> None:
     """Label the series of a job; all checks come before the first file is written."""
+    # A recording may take minutes: what is wrong in the options is said first.
     _check(job)
     eyes = label_recording(job)
     reviews, decided, lost = _reviewed(job, eyes)
     eyes = [_with_moved_edges(job, eye, decided) for eye in eyes]
+    # Rejected blinks stay in the table, marked, so that a decision can be taken back.
     frame = blinks_frame([blink for eye in eyes for blink in eye.blinks], decided, both_eyes(eyes))
     accepted = [_accepted_only(eye, decided) for eye in eyes]
     names = [eye_of(eye.series.column) for eye in eyes]
@@ -309,11 +317,13 @@ class _LabelledRecording:
 
 def _write(job: BlinksJob, labelled: _LabelledRecording) -> list[Path | None]:
     """Write what the job asks for; without a blink the table of profiles is empty. Return the files."""
+    # Computed before anything is written: a refusal here leaves all files as they were.
     more = job.more.prepared(job.series, labelled.eyes, labelled.frame, job.closed)
     _write_figures(job, labelled.eyes, labelled.decided, labelled.profiles)
     write_profile_table(job.profiles, labelled.profiles)
     if job.summary is not None:
         write_summary(job.summary, labelled.summaries)
+    # A review that was only read is not written again: somebody may have it open.
     if job.review is not None and (job.reject or job.accept):
         write_reviews(job.review, labelled.reviews)
     for write in more:
@@ -323,6 +333,7 @@ def _write(job: BlinksJob, labelled: _LabelledRecording) -> list[Path | None]:
         write_events(events, labelled.eyes)
     # The table of blinks last: where it is new, everything else is written.
     write_blinks(job.out, labelled.frame)
+    # The last line names what was written, not what was asked for.
     aligned = job.plot_aligned if labelled.profiles else None
     return [job.out, job.profiles, events, *job.more.paths, job.summary, job.plot, aligned]
 
@@ -351,6 +362,7 @@ def label_recording(job: BlinksJob) -> list[EyeBlinks]:
 
 
 def _blinks_of_all(job: BlinksJob, given: Sequence[BlinkSeries]) -> list[EyeBlinks]:
+    # Winks differ from blinks only in the other eye.
     seen = recognise(given) if job.classify else [None] * len(given)
     return [
         blinks_of(
@@ -398,6 +410,7 @@ def _reviewed(
     job: BlinksJob, eyes: Sequence[EyeBlinks]
 ) -> tuple[list[Review], dict[tuple[str, int], Review], list[Review]]:
     blinks = [blink for eye in eyes for blink in eye.blinks]
+    # A decision belongs to a moment: the numbers of blinks change with the options.
     reach = match_frames(eyes[0].series.fps)
     new = [parse_choice(text, "reject", blinks) for text in job.reject]
     new += [parse_choice(text, "accept", blinks) for text in job.accept]
@@ -428,6 +441,7 @@ def _rejected(decided: Mapping[tuple[str, int], Review]) -> set[tuple[str, int]]
 
 def _accepted_only(eye: EyeBlinks, decided: Mapping[tuple[str, int], Review]) -> EyeBlinks:
     rejected = _rejected(decided)
+    # Rates, profiles and figures are those of accepted blinks.
     kept = tuple(blink for blink in eye.blinks if (blink.column, blink.number) not in rejected)
     return replace(eye, blinks=kept)
 
