@@ -26,18 +26,20 @@ NOT_OURS = {
     "blink-engine.md": {"Live Link", "Apple ARKit Face Support", "Import", "Level Sequence"},  # of Unreal
 }
 """Names in other programs, and titles."""
-STRING = re.compile(r"\"([^\"\n]+)\"|'([^'\n]+)'|`([^`]+)`|>\s*([A-Z][^<>{}]*?)\s*[<{]", re.DOTALL)
+STRING = re.compile(r"\"([^\"\n]+)\"|'([^'\n]+)'|`([^`]+)`", re.DOTALL)
+BETWEEN_TAGS = re.compile(r">\s*([A-Z][^<>{}]*?)\s*[<{]")
 ATTRIBUTE = re.compile(r"=\"([^\"\n]+)\"")
 ITALIC = re.compile(r"(?<![\w*\\])\*([A-Z][^*\n]*)\*(?![\w*])")
 EMPHASIS = re.compile(r"`[^`\n]*`|\*\*[^*]+\*\*")
 
 
 def texts_of(source: str) -> Iterator[str]:
-    """Every string, every text between tags, and every attribute by itself.
+    """Every string, and every attribute and text between tags by itself.
 
-    A backtick inside a template makes the first expression take code for a string.
+    A backtick inside a template, or an apostrophe, makes the first expression take code for a string.
     """
     yield from ATTRIBUTE.findall(source)
+    yield from (" ".join(text.split()) for text in BETWEEN_TAGS.findall(source))
     for match in STRING.finditer(source):
         yield " ".join(next(part for part in match.groups() if part is not None).split())
 
