@@ -22,8 +22,9 @@ _TURNED_AWAY, _TURNED_DEPTH = (0.55, 1.25), 0.32
 CARUNCLE_AT, CARUNCLE_CM = 17, (0.27, 0.03, 0.085)
 """Point of the lids' edges (of 200) about which the corner's flesh lies; its half length, what of its half
 height lies under either lid, and its half depth, cm."""
-CARUNCLE_LIGHT, CARUNCLE_SINKS = 0.85, 0.22
-"""Its lightness over the white's, and the slope at which its temporal half sinks into the white."""
+CARUNCLE_LIGHT, CARUNCLE_SINKS = (0.85, 1.7), 0.22
+"""Its lightness over the white's, with dark and with light skin, where the darker one looked burned; and the
+slope at which its temporal half sinks into the white."""
 _PLICA_CM, _PLICA_WIDE_CM, _PLICA_HIGH_CM = 0.40, 0.07, 0.028
 """Way of the plica's crest from the corner's tip, its half width, and its height under the film."""
 _FLUSHED_CM = (0.30, 0.46)
@@ -80,7 +81,7 @@ def _nasal_end(
     return shade * (1 - 0.12 * crease * sclera), flush, plica
 
 
-def caruncle(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
+def caruncle(path: BlinkPath, posed: Array, side: int, stroke: float, melanin: float) -> Mesh:
     """The flesh between the lids' nasal ends, a bare and wet knob; shut lids press it flat."""
     ends = np.stack([edge_line(path, posed, side, EDGE_LOOP, upper) for upper in (True, False)])
     high, low = ends[:, CARUNCLE_AT]
@@ -100,8 +101,10 @@ def caruncle(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
     local[:, 2] -= CARUNCLE_SINKS * np.clip(local[:, 0], 0, None)
     middle = (high + low) / 2 - np.array([0, 0, depth * (1.0 + 0.4 * stroke)])
     vertices = middle + local[:, :1] * along + local[:, 1:] @ np.array([[0, 1.0, 0], [0, 0, 1.0]])
+    dark, light = CARUNCLE_LIGHT
     whole = np.ones(len(vertices))
-    values = {"sclera": whole, "shade": CARUNCLE_LIGHT * whole, "flush": whole}
+    lightness = dark + (light - dark) * smooth(0.9, 0.3, np.asarray(melanin))
+    values = {"sclera": whole, "shade": lightness * whole, "flush": whole}
     return Mesh(vertices, _tube_quads(rings, sectors), np.full((len(vertices), 2), 0.93), values)
 
 

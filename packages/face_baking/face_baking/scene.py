@@ -99,11 +99,12 @@ class FaceScene:
         """The parts without the skin's colors."""
         strokes, coarse, posed = self.strokes_of(pose), self._coarse(pose), self.posed_skin(pose)
         parts = [Part("skin", "skin", Mesh(posed, self.skin.fine.quads))]
+        melanin = self.identity.skin.melanin
         for side, name in SIDE_NAMES.items():
             stroke = strokes[side]
             parts += [
                 Part(f"eye_{name}", "eye", eyeball(self.path, coarse, side, stroke)),
-                Part(f"caruncle_{name}", "eye", caruncle(self.path, coarse, side, stroke)),
+                Part(f"caruncle_{name}", "eye", caruncle(self.path, coarse, side, stroke, melanin)),
                 Part(f"film_{name}", "film", wet_film(self.path, side, stroke)),
                 Part(f"tear_{name}", "tear", tear_line(self.path, coarse, side, stroke)),
                 Part(f"brow_{name}", "brow", self._brows[side].at(posed)),

@@ -34,12 +34,18 @@ def test_the_flesh_of_the_corner_lies_between_the_lids_ends(
     path: BlinkPath, side: int, stroke: float
 ) -> None:
     posed = path.at({1: stroke, -1: stroke})
-    knob = caruncle(path, posed, side, stroke).vertices
+    knob = caruncle(path, posed, side, stroke, 0.5).vertices
     upper, lower = chains(path.kit, path.loops[side][EDGE_LOOP], side)
     corner = posed[upper[0]]
     assert np.abs(knob[:, 0].mean() - corner[0]) < 0.35
     assert knob[:, 2].max() < posed[np.concatenate([upper[:5], lower[:7]]), 2].max()
     assert not np.isclose(knob[:, 1], knob[0, 1]).all()
+
+
+def test_the_flesh_of_light_skin_is_lighter(path: BlinkPath) -> None:
+    posed = path.at({1: 0.0, -1: 0.0})
+    light, dark = (caruncle(path, posed, 1, 0.0, melanin).values["shade"] for melanin in (0.2, 1.0))
+    assert light.min() > 1.5 * dark.max()
 
 
 @pytest.mark.parametrize("side", SIDES)
