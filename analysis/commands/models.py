@@ -177,7 +177,7 @@ def mixed(
     df: Annotated[
         DfChoice,
         typer.Option(
-            help="Denominator df; kenward-roger also corrects standard errors for few participants."
+            help="Denominator df; kenward-roger also enlarges standard errors where participants are few."
         ),
     ] = DfChoice.SATTERTHWAITE,
     intervals: Annotated[

@@ -287,7 +287,7 @@ class Form(Declaration):
     name: Name
     """Key of the form's answers in the runs CSV. [[screening]] refers to it as `form`."""
     when: Literal["before", "after"] = "before"
-    """`before`: after consent, before the trials. `after`: after the last trial."""
+    """When the form is shown. `before`: after consent, before the trials. `after`: after the last trial."""
     title: Translated
     """Heading of the page."""
     fields: Annotated[tuple[FormField, ...], Field(min_length=1)]

@@ -116,7 +116,7 @@ class Active(Declaration):
     by: Literal["active"] = "active"
     """The name of this method."""
     random_share: Annotated[float, Field(ge=0, le=1)] = 0.2
-    """Share of a participant's pairs that is drawn at random from the remaining pairs."""
+    """Share of a participant's pairs that is drawn at random, whatever the answers so far."""
 
 
 Dealing = Annotated[InTurn | IncompleteBlocks | Active, Field(discriminator="by")]

@@ -156,7 +156,7 @@ class Display(Declaration):
     """Distance between the centers of the eyes on the screen, in mm. Calibration converts it to pixels."""
     calibrate: Literal["required", "optional", "off"] = "required"
     """Whether participants match a card's outline to measure the pixels per mm of their screen. Without
-    calibration, clips are shown at one pixel per pixel and `px_per_mm` is empty in the data."""
+    calibration, one pixel of the clip is one pixel of the screen, and `px_per_mm` is empty in the data."""
     calibration_repeats: Annotated[int, Field(ge=2, le=6)] = 2
     """How often the size is measured, each time from a different starting size. If measurements differ too
     much, up to two more follow. Their spread is `calibration_spread` in the data."""

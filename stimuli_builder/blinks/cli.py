@@ -149,7 +149,7 @@ def blinks(
     plot_aligned: Annotated[
         Path | None, typer.Option(help="Figure of aligned blinks and histograms.")
     ] = None,
-    review: Annotated[Path | None, typer.Option(help="Review file (CSV); decisions are added to it.")] = None,
+    review: Annotated[Path | None, typer.Option(help="Review file (CSV): each decision adds a row.")] = None,
     reject: Annotated[
         list[str] | None, typer.Option(help="N=reason or COLUMN:N=reason; needs --review.")
     ] = None,
@@ -346,7 +346,7 @@ def export(
         typer.Option(help="Name of a shipped profile to use instead of the model; repeatable."),
     ] = None,
     profiles: Annotated[
-        Path | None, typer.Option(help="Use all profiles of a table instead of the model.")
+        Path | None, typer.Option(help="CSV of profiles: use all of them instead of the model's.")
     ] = None,
     model: ModelOption = None,
     pca: PcaOption = False,

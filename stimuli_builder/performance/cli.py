@@ -30,7 +30,9 @@ def performance(
     ] = 1,
     state: Annotated[
         str,
-        typer.Option(help="Activity while not speaking: rest, reading, screen, speaking, listening."),
+        typer.Option(
+            help="What the person does where nothing is said: rest, reading, screen, speaking or listening."
+        ),
     ] = "listening",
     duration: Annotated[
         float | None, typer.Option(help="Length in seconds. Default: the recording's length.")
