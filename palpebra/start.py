@@ -19,7 +19,7 @@ from experiments.errors import InputError
 from palpebra.folders import DATA_VARIABLE, PORT, Folder, data_folder, default_folder, free_port, use_folder
 
 if TYPE_CHECKING:  # the server is only imported when it starts, so that `palpebra --help` is quick
-    from server.cli_run import Welcome
+    from server.cli_run import StudyLink, Welcome
 
 DEMO = Path(__file__).resolve().parent / "demo"
 """The demo's declaration and clips; `make wheel` builds them."""
@@ -78,7 +78,7 @@ def first_page(welcome: "Welcome", folder: Path) -> str:
     """
     known = {"folder": str(folder)}
     if link := demo_link(welcome):
-        known["demo"] = link
+        known |= {"demo": link.path, "minutes": str(max(1, round(link.minutes)))}
     if welcome.invitation:
         known["invitation"] = welcome.invitation
     return f"/admin/start#{urlencode(known, quote_via=quote)}"
@@ -95,13 +95,13 @@ def demo_page(welcome: "Welcome", folder: Path) -> str:
     link = demo_link(welcome)
     if link is None:
         raise InputError(f"the demo study was removed from {folder}; choose another folder by --folder")
-    return link
+    return link.path
 
 
-def demo_link(welcome: "Welcome") -> str | None:
-    """Path of the demo's link for participants; None if this server has no demo."""
-    paths = {link.study: link.path for link in welcome.links}
-    return next((paths[name] for name in DEMOS if name in paths), None)
+def demo_link(welcome: "Welcome") -> "StudyLink | None":
+    """The demo's link for participants, the short one first; None if this server has no demo."""
+    links = {link.study: link for link in welcome.links}
+    return next((links[name] for name in DEMOS if name in links), None)
 
 
 def _serve(folder: Path | None, port: int | None, page: Page, *, with_browser: bool) -> None:

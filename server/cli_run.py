@@ -12,6 +12,7 @@ import typer
 import uvicorn
 
 from experiments.errors import InputError
+from experiments.kinds import expected_minutes
 from server.accounts import invitations
 from server.accounts import service as accounts
 from server.accounts.endpoints import invitation_url
@@ -24,6 +25,7 @@ from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.privacy.ledger import begin_ledger
 from server.protocol import BoundedHttp
 from server.studies.links import general_links, link_url
+from server.studies.lookup import active_definition
 from server.studies.repository import open_studies
 
 GRACE_S = 20
@@ -149,6 +151,8 @@ class StudyLink(NamedTuple):
     status: str
     group: str | None
     path: str
+    minutes: float
+    """How long taking part is expected to take."""
 
 
 class Welcome(NamedTuple):
@@ -164,8 +168,9 @@ def make_welcome(services: Services) -> Welcome:
     key = services.settings.key
     with services.database.write() as session:
         links = [
-            StudyLink(study.name, study.status, link.group_name, link_url("", key, link.public_id))
+            StudyLink(study.name, study.status, link.group_name, link_url("", key, link.public_id), minutes)
             for study in open_studies(session)
+            for minutes in [expected_minutes(active_definition(session, study))]
             for link in general_links(session, key, study)
         ]
         is_first = not accounts.accounts_exist(session)

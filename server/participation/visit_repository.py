@@ -100,11 +100,14 @@ def page_of_runs(
     return list(session.scalars(query if before is None else query.where(StudyRun.id < before)))
 
 
-def answered_trials(session: Session, runs: Sequence[int]) -> dict[int, tuple[int, int]]:
+def answered_trials(session: Session, runs: Sequence[int]) -> dict[int, tuple[set[int], int]]:
     """Run number -> (trials answered, plays that were flagged or failed); for one page of runs."""
     query = select(RunTally.study_run_id, RunTally.heat, RunTally.not_good)
     rows = session.execute(query.where(RunTally.study_run_id.in_(runs)))
-    return {run: (len(heat) - heat.count("."), not_good) for run, heat, not_good in rows}
+    return {
+        run: ({trial for trial, letter in enumerate(heat) if letter != "."}, not_good)
+        for run, heat, not_good in rows
+    }
 
 
 def refused_records(session: Session, runs: Sequence[int]) -> dict[int, int]:

@@ -2,6 +2,8 @@
 
 import subprocess
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from importlib.util import find_spec
 
@@ -15,7 +17,7 @@ from server.accounts.audit import record
 from server.accounts.identity import Identity
 from server.core.db import Database
 from server.core.errors import Conflict, NotFound
-from server.core.locks import Locks
+from server.core.locks import Locks, LockTaken
 from server.core.settings import Settings
 from server.core.values import new_public_id, now
 from server.models import Job
@@ -66,7 +68,7 @@ def start_clip_build(
         raise NotFound(f"There is no shipped experiment '{experiment}'.")
     if missing := _what_is_missing():
         raise Conflict(missing)
-    with database.write() as session:
+    with _only_one(locks), database.write() as session:
         for name, earlier in _latest_jobs(session).items():
             if is_under_way(locks, earlier):
                 raise Conflict(f"The clips of '{name}' are being built. Wait until they are done.")
@@ -85,6 +87,16 @@ def start_clip_build(
         public_id = job.public_id
     in_background(database, locks, public_id, partial(build_clips, database, settings, public_id, experiment))
     return begun
+
+
+@contextmanager
+def _only_one(locks: Locks) -> Iterator[None]:
+    """Of two requests at once the second is refused: each would see no build under way."""
+    try:
+        with locks.held(KIND):
+            yield
+    except LockTaken as error:
+        raise Conflict("Clips are being built. Wait until they are done.") from error
 
 
 def _what_is_missing() -> str:

@@ -1,5 +1,6 @@
 """Timelines, exclusion with a reason, and erasure on request."""
 
+from collections.abc import Collection
 from datetime import timedelta
 
 from sqlalchemy.orm import Session
@@ -12,6 +13,7 @@ from server.models import AssignedTrial, Link, Rating, Study, StudyRun, VersionC
 from server.participation import visit_repository
 from server.participation.identity_keys import ParticipantIdentity, UnreadableError
 from server.participation.identity_repository import known_as
+from server.results.monitor_repository import main_trials
 from server.results.schemas import (
     RunIdentity,
     RunPage,
@@ -41,9 +43,13 @@ def page(
     shown = runs[:limit]
     counts = visit_repository.answered_trials(session, [run.id for run in shown])
     refused = visit_repository.refused_records(session, [run.id for run in shown])
+    main = main_trials(session, shown)
     are_all = last is None and len(runs) <= limit
     return RunPage(
-        runs=[summary(run, *counts.get(run.id, (0, 0)), refused.get(run.id, 0)) for run in shown],
+        runs=[
+            summary(run, *counts.get(run.id, (set(), 0)), refused.get(run.id, 0), main[run.id])
+            for run in shown
+        ],
         total=len(shown)
         if are_all
         else visit_repository.number_of_runs(session, study, show, search, simulated=simulated),
@@ -51,8 +57,10 @@ def page(
     )
 
 
-def summary(run: StudyRun, answered: int, not_good: int, refused: int) -> RunSummary:
-    """One line of the participants page."""
+def summary(
+    run: StudyRun, answered: Collection[int], not_good: int, refused: int, main: Collection[int]
+) -> RunSummary:
+    """One line of the participants page; the study counts the trials `main` alone."""
     spent = (run.completed_at or run.last_seen_at) - run.started_at
     return RunSummary(
         run=run.public_id,
@@ -67,7 +75,9 @@ def summary(run: StudyRun, answered: int, not_good: int, refused: int) -> RunSum
         completed_at=run.completed_at,
         minutes=round(spent / timedelta(minutes=1), 1),
         trials=run.trials_total,
-        answered=answered,
+        answered=len(answered),
+        main_trials=len(main),
+        main_answered=len(set(answered).intersection(main)),
         not_good=not_good,
         refused=refused,
         excluded=run.excluded,
@@ -104,12 +114,11 @@ def timeline(session: Session, study: Study, public_id: str) -> Timeline:
     """Everything stored of one run."""
     run = visit_repository.find_run(session, study, public_id)
     plays = visit_repository.plays(session, run)
-    answered = len({rating.trial_index for rating, _, _ in plays})
+    answered = {rating.trial_index for rating, _, _ in plays}
+    refused = visit_repository.refused_records(session, [run.id]).get(run.id, 0)
     not_good = sum(rating.verdict in ("flagged", "failed") for rating, _, _ in plays)
     return Timeline(
-        summary=summary(
-            run, answered, not_good, visit_repository.refused_records(session, [run.id]).get(run.id, 0)
-        ),
+        summary=summary(run, answered, not_good, refused, main_trials(session, [run])[run.id]),
         device=run.device,
         consented_at=run.consented_at,
         trials=[_trial(*play) for play in plays],

@@ -378,6 +378,8 @@ class RunSummary(BaseModel):
     minutes: float = Field(description="From start to end, or to the last sign of life.")
     trials: int
     answered: int
+    main_trials: int = Field(description="Trials that are neither practice nor a check.")
+    main_answered: int
     not_good: int = Field(description="Plays that were flagged or failed.")
     refused: int = Field(description="Answers and views that could not be stored; the timeline has why.")
     excluded: bool

@@ -39,11 +39,19 @@ from server.core.settings import Settings
 from server.core.storage import ClipStore
 from server.models import Right, Study, StudyVersion, Workspace
 from server.studies import own_clips, repository
-from server.studies.launch_checks import refuse_if_live
+from server.studies.launch_checks import CLIPS_WITHIN_S, clip_findings, refuse_if_live
 from server.studies.lookup import active_version, find_study, must_not_be_archived
-from server.studies.schemas import LevelsPattern, LevelsTable, NewStudy, NewVersion, ShippedExperiment
+from server.studies.schemas import (
+    LaunchCheck,
+    LevelsPattern,
+    LevelsTable,
+    NewStudy,
+    NewVersion,
+    ShippedExperiment,
+)
 from server.studies.series import series_for
 from server.studies.uploads import upload_folder
+from server.transcoding.preparing import StoredClips
 from server.transcoding.records import videos_of
 from video_conversion.prepared import QUICKTIME, major_brand
 
@@ -394,16 +402,31 @@ def _placed_levels(levels: LevelsTable | LevelsPattern | None, folder: Path) -> 
 
 
 def add_definition(
-    database: Database, settings: Settings, clips: ClipStore, name: str, order: NewVersion, identity: Identity
+    database: Database,
+    settings: Settings,
+    clips: ClipStore,
+    stored: StoredClips,
+    name: str,
+    order: NewVersion,
+    identity: Identity,
 ) -> None:
-    """Store a changed definition as a new version, with the clips there are and those of an upload."""
+    """Store a changed definition as a new version, with the clips there are and those of an upload.
+
+    Where the study is live, each clip that the version adds is decoded before.
+    """
     with database.read() as session:
-        find_study(session, name, identity, "edit")  # refused before a clip is stored
+        study = find_study(session, name, identity, "edit")  # refused before a clip is stored
+        is_live = study.status == "live"
+        known = {clip.sha256 for clip in active_manifest(session, study).files}
     experiment = planned_experiment(order.toml)
     added = _added_clips(settings, clips, order, experiment, identity)
+    of_clips: list[LaunchCheck] = []
+    if is_live and added is not None:
+        new = [clip for clip in added.files if clip.sha256 not in known]
+        of_clips = clip_findings(*stored.find_faults(new, CLIPS_WITHIN_S))
     with database.write() as session:
         study = for_edit(session, name, order.revision, identity, "edit")
-        manifest = Manifest.model_validate(active_version(session, study).manifest)
+        manifest = active_manifest(session, study)
         if order.places is not None:
             manifest = own_clips.placed_manifest(manifest, added, order.places, experiment)
         elif added is not None:
@@ -411,7 +434,12 @@ def add_definition(
             manifest = own_clips.merged_manifest(manifest, added)
         manifest = own_clips.only_declared(manifest, experiment)
         add_version(session, study, order.toml, experiment, manifest, identity, order.note)
-        refuse_if_live(session, study)
+        refuse_if_live(session, study, of_clips)
+
+
+def active_manifest(session: Session, study: Study) -> Manifest:
+    """The clips that new runs of a study use."""
+    return Manifest.model_validate(active_version(session, study).manifest)
 
 
 def _added_clips(

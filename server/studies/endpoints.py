@@ -115,7 +115,9 @@ def delete_study(database: DatabaseDep, identity: Writer, study: str) -> None:
 @router.post("/studies/{study}/versions", status_code=201)
 def add_version(services: ServicesDep, identity: Writer, study: str, body: NewVersion) -> StudyDetail:
     """Store a changed definition as a new version; runs keep the version they began with."""
-    creation.add_definition(services.database, services.settings, services.clips, study, body, identity)
+    creation.add_definition(
+        services.database, services.settings, services.clips, services.stored_clips, study, body, identity
+    )
     return get_study(services.database, identity, study)
 
 

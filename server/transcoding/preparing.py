@@ -227,35 +227,41 @@ class StoredClips:
                 asked[_key(clip)] = clip
         waiting = list(asked.values())
         while waiting and time.monotonic() < ends:
-            done = self._examine_in_process(waiting[:AT_ONCE])
+            done = self._examine_in_process(waiting[:AT_ONCE], ends)
             for clip, faults in done:
                 self._known[_key(clip)] = faults
             waiting = waiting[len(done) :]
         return len(waiting)
 
     def _examine_in_process(
-        self, clips: Sequence[Clip | CheckClip]
+        self, clips: Sequence[Clip | CheckClip], ends: float
     ) -> list[tuple[Clip | CheckClip, tuple[ClipFault, ...]]]:
-        """The first clips with what is wrong with them, at least one: the process may end at a bad one."""
+        """The first clips with what is wrong with them.
+
+        At least one, as the process may end at a bad one; fewer only where the time is over at `ends`.
+        """
         with ExitStack() as held:
             orders = [{"path": str(self._path(clip, held)), **_expected(clip)} for clip in clips]
+            longest_s = LONGEST_S_A_CLIP * len(clips)
+            is_cut = False
             try:
                 answer = subprocess.run(
                     [sys.executable, "-m", "server.transcoding.preparing"],
                     input=json.dumps(orders),
                     capture_output=True,
                     text=True,
-                    timeout=LONGEST_S_A_CLIP * len(clips),
+                    timeout=max(0.0, min(longest_s, ends - time.monotonic())),
                     check=False,
                 ).stdout
             except subprocess.TimeoutExpired as error:
                 answer = (error.stdout or b"").decode()
+                is_cut = time.monotonic() >= ends
         lines = [json.loads(line) for line in answer.splitlines() if line.endswith("]")]
         done = [
             (clip, tuple(ClipFault(kind, clip.file, detail) for kind, detail in faults))
             for clip, faults in zip(clips, lines, strict=False)
         ]
-        if len(done) < len(clips):
+        if len(done) < len(clips) and not is_cut:
             stopped = clips[len(done)]
             fault = ClipFault("undecodable", stopped.file, "it stopped the decoder")
             done.append((stopped, (fault,)))

@@ -22,6 +22,23 @@ export class Refused extends Error {
   }
 }
 
+/** Codes that say no more than the status. */
+const GENERAL = new Map([
+  ["invalid", "Please change your entry"],
+  ["validation_failed", "Please change your entry"],
+  ["conflict", "Not possible at the moment"],
+  ["not_found", "Not found"],
+  ["not_allowed", "Not allowed"],
+  ["offline", "No connection"],
+]);
+
+/** What a message about an error is headed: what was refused, in words; only a fault of the program has "gone wrong". */
+export function titleOf(error: Error): string {
+  if (!(error instanceof Refused) || error.status >= 500 || error.code === "unknown") return "Something went wrong";
+  const words = error.code.replaceAll("_", " ");
+  return GENERAL.get(error.code) ?? `${words.charAt(0).toUpperCase()}${words.slice(1)}`;
+}
+
 interface Outcome<T> {
   data?: T | undefined;
   error?: unknown;

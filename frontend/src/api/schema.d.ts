@@ -2990,6 +2990,8 @@ export interface components {
    minutes: number;
    trials: number;
    answered: number;
+   main_trials: number;
+   main_answered: number;
    not_good: number;
    refused: number;
    excluded: boolean;

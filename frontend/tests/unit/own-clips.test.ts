@@ -1,4 +1,5 @@
 import { describe, expect, it } from "vitest";
+import { Refused, titleOf } from "../../src/admin/api";
 import type { Data } from "../../src/admin/builder/data";
 import {
   arrangementOf,
@@ -248,4 +249,12 @@ it("the way back of a recruiter has the code, the id and any run", () => {
   expect(isReturn("https://x.org/a?c=C%20D&id=selftest&r=1&more=2", expected)).toBe(false);
   expect(expectedReturn({ kind: "prolific" }, "C", parameters)).toBe("https://app.prolific.com/submissions/complete?cc=C");
   expect(expectedReturn({ kind: "mturk" }, "C", parameters)).toBe("");
+});
+
+it("a refusal is headed by what was refused, a fault by that alone", () => {
+  expect(titleOf(new Refused(409, "still_preparing", "Wait."))).toBe("Still preparing");
+  expect(titleOf(new Refused(422, "weak_password", "Longer."))).toBe("Weak password");
+  expect(titleOf(new Refused(409, "conflict", "Wait."))).toBe("Not possible at the moment");
+  expect(titleOf(new Refused(500, "internal", "A fault."))).toBe("Something went wrong");
+  expect(titleOf(new Error("x is undefined"))).toBe("Something went wrong");
 });

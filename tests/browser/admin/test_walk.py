@@ -144,6 +144,8 @@ def test_the_timeline_of_a_run_shows_each_trial(dashboard: Dashboard) -> None:
     page = dashboard.open("/studies/short/participants")
     page.get_by_role("table").get_by_role("link").first.click()
     page.get_by_text("Each frame drawn").wait_for()
+    run = page.url.rsplit("/", 1)[1]
+    expect(page.get_by_role("main").get_by_text(run)).to_have_count(1)
     shoot(dashboard, "timeline")
     assert axe_violations(page) == []
 

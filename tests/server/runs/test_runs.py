@@ -9,7 +9,14 @@ def test_a_timeline_shows_every_play(viewer: Admin, participant: Participant) ->
     timeline = viewer.get(f"/studies/short/runs/{participant.run_id}").json()
     assert len(timeline["trials"]) == 12
     assert timeline["trials"][0]["drawn"][1] == [1, 43.3]
-    assert timeline["summary"]["answered"] == 12
+    summary = timeline["summary"]
+    assert summary["answered"] == 12
+    # Practice and attention questions are left out of what the participants page counts.
+    main = sum(trial["kind"] == "main" for trial in timeline["trials"])
+    assert 0 < main < 12
+    assert (summary["main_answered"], summary["main_trials"]) == (main, main)
+    [listed] = viewer.get("/studies/short/runs").json()["runs"]
+    assert (listed["main_answered"], listed["main_trials"]) == (main, main)
 
 
 def test_exclusion_is_kept_with_its_reason_and_can_be_undone(

@@ -3,6 +3,7 @@
 import hashlib
 import io
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +11,22 @@ import pytest
 from fastapi.testclient import TestClient
 
 from experiments.level_leaks import reported_leaks
-from experiments.manifest import Manifest
+from experiments.load import parse_experiment
+from experiments.manifest import MANIFEST_NAME, Manifest
 from server.context import Services
 from server.core.settings import Settings
 from server.core.storage import FolderStore
 from server.models import Job, Study, StudyVersion
 from server.operations.doctor import Finding
 from server.rehearsals.service import of_finding
+from server.studies.creation import store_clips
+from server.transcoding.preparing import StoredClips
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.motion_checks import checked
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
+from tests.helpers.tiny_clips import make_clip_folder
+from tests.helpers.uploads import upload
 
 
 def test_levels_distinguished_by_something_else_are_named_before_going_live(
@@ -410,3 +416,40 @@ def test_the_disk_is_examined_only_for_accounts_that_may_see_the_study(
     assert asked == []
     assert owner.get("/studies/short/launch-checks").status_code == 200
     assert asked
+
+
+def test_a_new_version_of_a_live_study_is_decoded_before_it_is_live(
+    owner: Admin, services: Services, tmp_path: Path
+) -> None:
+    add_study(services, tmp_path / "clips", READY, status="live")
+    folder = tmp_path / "more"
+    manifest = make_clip_folder(parse_experiment(READY), folder, frames=5)
+    bad = manifest.clips[0]
+    data = b"\0\0\0\x18ftypisom" + b"no video" * 64
+    (folder / bad.file).write_bytes(data)
+    replaced = bad.model_copy(update={"sha256": hashlib.sha256(data).hexdigest(), "bytes": len(data)})
+    written = manifest.model_copy(update={"clips": (replaced, *manifest.clips[1:])})
+    (folder / MANIFEST_NAME).write_text(written.model_dump_json(), encoding="utf-8")
+    sent = upload(owner, *((path.name, path.read_bytes()) for path in folder.iterdir())).json()
+    revision = owner.get("/studies/short").json()["summary"]["revision"]
+    body = {"revision": revision, "toml": READY, "upload": sent["id"]}
+    refused = owner.send("POST", "/studies/short/versions", body)
+    assert refused.status_code == 409, refused.text
+    assert "1 clip does not play in the participant page" in refused.json()["error"]["message"]
+    assert owner.get("/studies/short").json()["summary"]["version"] == 1
+
+
+def test_a_batch_of_clips_is_cut_at_the_end_of_its_time(services: Services, tmp_path: Path) -> None:
+    wanted = READY.replace("per_cell = 2", "per_cell = 16")
+    assert wanted != READY
+    experiment = parse_experiment(wanted)
+    folder = tmp_path / "clips"
+    manifest = make_clip_folder(experiment, folder, frames=600, size_px=(640, 360))
+    store_clips(services.clips, manifest, folder)
+    assert len(manifest.clips) == 64
+    stored = StoredClips(services.clips)
+    began = time.monotonic()
+    faults, left = stored.find_faults(manifest.clips, 1.0)
+    assert time.monotonic() - began < 5
+    assert faults == []  # a clip at which the time was over is not at fault
+    assert left > 0

@@ -579,6 +579,13 @@ def test_a_build_that_fails_says_why_and_can_be_asked_for_again(
         assert "Traceback" not in build["message"]
 
 
+def test_of_two_builds_asked_for_at_once_one_begins(experimenter: Admin, services: Services) -> None:
+    with services.locks.held(demo_builds.KIND):  # as the other request holds it between its look and its job
+        refused = experimenter.send("POST", "/experiments/dcr-demo/builds")
+    assert (refused.status_code, _ended_builds(experimenter)) == (409, [])
+    assert "being built" in refused.json()["error"]["message"]
+
+
 def _ended_builds(viewer: Admin) -> list[dict[str, str]]:
     until = time.monotonic() + 60
     while time.monotonic() < until:

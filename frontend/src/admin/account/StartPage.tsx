@@ -5,6 +5,8 @@ import { useState } from "react";
 
 interface Known {
   demo: string | null;
+  /** How long the demo takes; null from a server that does not say. */
+  minutes: string | null;
   invitation: string | null;
   folder: string | null;
 }
@@ -16,12 +18,18 @@ function whatIsKnown(): Known {
   const parts = new URLSearchParams(window.location.hash.slice(1));
   const demo = parts.get("demo");
   // Only a path of this server: the page must not send anyone elsewhere.
-  return { demo: demo?.startsWith("/run/") === true ? demo : null, invitation: parts.get("invitation"), folder: parts.get("folder") };
+  const minutes = parts.get("minutes");
+  return {
+    demo: demo?.startsWith("/run/") === true ? demo : null,
+    minutes,
+    invitation: parts.get("invitation"),
+    folder: parts.get("folder"),
+  };
 }
 
 export function StartPage() {
   useDocumentTitle("Welcome – Palpebra");
-  const [{ demo, invitation, folder }] = useState(whatIsKnown);
+  const [{ demo, minutes, invitation, folder }] = useState(whatIsKnown);
   const entrance = (to: string) => (invitation === null ? "/admin" + to : `/admin/invitation?next=${encodeURIComponent(to)}#${invitation}`);
   return (
     <Container size="lg" py={48} component="main">
@@ -35,7 +43,7 @@ export function StartPage() {
         {demo !== null && (
           <Choice
             title="Try the demo study"
-            text="Take part yourself: watch blinks and rate how natural they look. Stop whenever you like."
+            text={`Take part yourself: watch blinks and rate how natural they look. ${minutes === null ? "" : `All of it takes about ${minutes} ${minutes === "1" ? "minute" : "minutes"}. `}Stop whenever you like.`}
             button="Take part"
             href={demo}
             newTab

@@ -3,7 +3,7 @@
 import { Alert, Badge, Button, Group, Stack, Text } from "@mantine/core";
 import { useVirtualizer } from "@tanstack/react-virtual";
 import { type RefObject, useRef } from "react";
-import type { Schemas } from "../api";
+import { type Schemas, titleOf } from "../api";
 import { counted } from "../ui/format";
 import { changesOf } from "./ClipCard";
 import type { Upload } from "./useUpload";
@@ -28,7 +28,7 @@ export function FileTable({ files, leftOut, upload }: Props) {
   return (
     <Stack gap="xs">
       {upload.notLeftOut !== null && (
-        <Alert color="red" variant="light" title="Something went wrong" role="alert">
+        <Alert color="red" variant="light" title={titleOf(upload.notLeftOut)} role="alert">
           {upload.notLeftOut.message}
         </Alert>
       )}

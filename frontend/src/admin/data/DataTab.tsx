@@ -216,7 +216,11 @@ async function readObject(file: File | null): Promise<Record<string, unknown> | 
   } catch {
     // Said below, as for JSON of another kind.
   }
-  notify({ title: "Something went wrong", message: `${file.name}: expected the JSON of analysis power, got another file.`, color: "red" });
+  notify({
+    title: "Not the file of a power analysis",
+    message: `${file.name}: expected the JSON of analysis power, got another file.`,
+    color: "red",
+  });
   return null;
 }
 

@@ -84,7 +84,7 @@ function RunsTable({ study, rows, empty }: { study: string; rows: Run[]; empty: 
       columns={[
         { title: "Participant", wrap: true, cell: (run) => <ParticipantCell study={study} run={run} /> },
         { title: "Status", cell: (run) => (run.erased_at !== null ? "erased" : run.status.replace("_", " ")) },
-        { title: "Answered", number: true, cell: (run) => `${run.answered} of ${run.trials}` },
+        { title: "Answered", number: true, cell: (run) => `${run.main_answered} of ${run.main_trials}` },
         { title: "Plays flagged or failed", number: true, wide: true, cell: (run) => run.not_good },
         { title: "Began", wide: true, cell: (run) => when(run.started_at) },
         { title: "Minutes", number: true, wide: true, cell: (run) => run.minutes.toFixed(1) },

@@ -287,16 +287,24 @@ export function TimelinePage() {
             <Group justify="space-between" align="start">
               <div>
                 <Title order={2} size="h3">
-                  {data.summary.participant}
+                  {data.summary.run === data.summary.participant ? (
+                    <>
+                      Run <CopyId value={data.summary.run} what="run id" />
+                    </>
+                  ) : (
+                    data.summary.participant
+                  )}
                 </Title>
                 <Text size="sm" c="dimmed">
                   {words(data.summary.status)}, began {when(data.summary.started_at)},{" "}
                   {data.consented_at === null ? "has not agreed" : `agreed ${when(data.consented_at)}`}, {data.summary.minutes.toFixed(1)}{" "}
                   minutes, language {data.summary.language}, through “{data.summary.link}”
                 </Text>
-                <Text size="sm" c="dimmed" component="div">
-                  Run <CopyId value={data.summary.run} what="run id" />
-                </Text>
+                {data.summary.run !== data.summary.participant && (
+                  <Text size="sm" c="dimmed" component="div">
+                    Run <CopyId value={data.summary.run} what="run id" />
+                  </Text>
+                )}
                 {data.summary.excluded && <Text c="var(--mantine-color-error)">Excluded: {data.summary.exclusion_reason}</Text>}
               </div>
               <Group>

@@ -4,12 +4,13 @@ import { Alert, Button, Center, Loader, Group, Text, Anchor, Container, Title } 
 import type { UseQueryResult, InfiniteData, UseInfiniteQueryResult } from "@tanstack/react-query";
 import { type ReactNode, type ComponentType, lazy, Suspense } from "react";
 import { Link } from "@tanstack/react-router";
+import { titleOf } from "../api";
 
 // What a page shows while it waits, and where the server refused.
 
 export function ErrorAlert({ error, retry }: { error: Error; retry?: () => void }) {
   return (
-    <Alert color="red" variant="light" title="Something went wrong" role="alert" my="sm">
+    <Alert color="red" variant="light" title={titleOf(error)} role="alert" my="sm">
       {error.message}
       {retry !== undefined && (
         <Button mt="sm" size="xs" variant="default" onClick={retry} display="block">

@@ -2,7 +2,7 @@
 
 import type { NotificationData } from "@mantine/notifications";
 import { type QueryKey, useMutation, useQueryClient } from "@tanstack/react-query";
-import { Refused } from "../api";
+import { titleOf } from "../api";
 
 // Short messages in the corner of the page; their code loads after the page itself.
 
@@ -23,11 +23,6 @@ interface Options<T> {
   before?: () => void;
   /** Shows a refusal in the page itself and returns true; any other refusal is reported in the corner. */
   refused?: (error: Error) => boolean;
-}
-
-/** An entry that the server does not accept, such as a weak password, is not a fault of the program. */
-function titleOf(error: Error): string {
-  return error instanceof Refused && error.status === 422 ? "Not saved: please change your entry" : "Something went wrong";
 }
 
 export function useChange<Input, T>(change: (input: Input) => Promise<T>, { touches, done, then, before, refused }: Options<T>) {
