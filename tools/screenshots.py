@@ -29,7 +29,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, expect, sync_playwright
 
 from experiments.declaration.rendering import RenderSettings
 from server.accounts import invitations
@@ -278,6 +278,8 @@ def build_study(page: Page, address: str) -> None:
     for section in SECTIONS:
         page.goto(f"{address}/admin/studies/robots/build?section={section}")
         save.wait_for()
+        if section == "factors":
+            expect(page.locator(".grid-of-cells canvas[data-drawn]")).to_have_count(12)
         keep_in_palette(page, section)
 
 
@@ -292,6 +294,8 @@ def go_live(page: Page, address: str) -> None:
     keep_in_palette(page, "rehearsal")
     page.get_by_role("button", name="Set live").click()
     page.get_by_role("dialog").get_by_role("button", name="Set live").click()
+    # The checklist before has words in code, too.
+    page.get_by_text("Participants can start", exact=True).wait_for()
     page.get_by_role("dialog").locator("code").first.wait_for()
     keep_in_palette(page, "live")
 

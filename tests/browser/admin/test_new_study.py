@@ -13,6 +13,7 @@ from tests.helpers.tiny_clips import encoded_video
 
 pytestmark = pytest.mark.browser
 MAX_INTERACTIONS = 20
+MAX_INTERACTIONS_OF_OTHERS = 25
 
 
 class Hand:
@@ -114,6 +115,44 @@ def test_own_clips_to_a_live_link(dashboard: Dashboard, clips: list[Path]) -> No
 
     opened = page.request.get(dashboard.server.address + link[link.index("/run/") :])
     assert opened.ok
+
+
+@pytest.mark.parametrize(
+    ("card", "pattern", "names"),
+    [
+        ("Rating on seven points", "{robot}_{speed}_{exemplar}.mp4", None),
+        ("Paired comparisons", "{robot}_{speed}_{exemplar}.mp4", None),
+        ("Just-noticeable", "blink_{duration}_{exemplar}.mp4", ("100", "150", "200", "250", "300", "350")),
+    ],
+    ids=["rating", "pairs", "threshold"],
+)
+def test_each_kind_of_study_is_live_within_its_interactions(
+    dashboard: Dashboard, clips: list[Path], card: str, pattern: str, names: tuple[str, ...] | None
+) -> None:
+    if names is not None:
+        places = [f"blink_{name}_{number}.mp4" for name in names for number in (1, 2)]
+        clips = [clip.rename(clip.with_name(name)) for clip, name in zip(clips, places, strict=True)]
+    page = dashboard.open("/")
+    page.evaluate("localStorage.clear()")
+    hand = Hand(page)
+    study = f"study_{pattern[1:5].strip('{}_')}_{card.split()[0].lower()}"
+    hand.click(page.get_by_role("link", name="New study"))
+    hand.fill(page.get_by_label("Short name"), study)
+    hand.bring(clips)
+    page.get_by_text("12 clips received").wait_for()
+    hand.click(page.get_by_role("radio", name=re.compile(card)))
+    hand.fill(page.get_by_label("Pattern", exact=True), pattern)
+    hand.fill(page.get_by_label("Title of the study"), card)
+    hand.press("Create")
+    page.get_by_text(f"{study}, version 1").wait_for()
+    hand.press("Set live")
+    confirm = page.get_by_role("dialog").get_by_role("button", name="Set live")
+    expect(confirm).to_be_enabled()
+    hand.click(confirm)
+    expect(page.get_by_text("Participants can start", exact=True)).to_be_visible()
+    assert "/run/" in page.get_by_role("dialog").locator("code").first.inner_text()
+    most = MAX_INTERACTIONS if card.startswith("Rating") else MAX_INTERACTIONS_OF_OTHERS
+    assert hand.interactions <= most, f"{hand.interactions} interactions"
 
 
 def test_a_demonstration_is_built_by_a_button_and_made_a_study(dashboard: Dashboard) -> None:

@@ -9,6 +9,7 @@ from playwright.sync_api import Page, expect
 from experiments.load import parse_experiment
 from server.cli_common import migrated_services
 from tests.browser.admin.conftest import Dashboard
+from tests.browser.admin.test_level_grid import made_study
 from tests.browser.conftest import REPOSITORY
 from tests.helpers.studies import add_study
 
@@ -42,9 +43,22 @@ def test_pages_of_a_shipped_study_have_at_most_two_screens(
     dashboard: Dashboard, tmp_path: Path, file: Path
 ) -> None:
     text = file.read_text(encoding="utf-8")
-    name = parse_experiment(text).name
     with migrated_services(dashboard.server.settings) as services:
         add_study(services, tmp_path, text, status="draft")
+    measured = heights(dashboard, parse_experiment(text).name)
+    assert len(measured) == 17
+    assert {name: height for name, height in measured.items() if height > MOST_PX} == {}
+
+
+def test_pages_of_a_study_of_own_clips_have_at_most_two_screens(dashboard: Dashboard) -> None:
+    made_study(dashboard, "own")
+    measured = heights(dashboard, "own")
+    assert len(measured) == 17
+    assert {name: height for name, height in measured.items() if height > MOST_PX} == {}
+
+
+def heights(dashboard: Dashboard, name: str) -> dict[str, int]:
+    """The height of each page of the builder and of the settings of a study, by name."""
     page = dashboard.page
     before = page.viewport_size
     page.set_viewport_size(SCREEN)  # type: ignore[arg-type]
@@ -58,5 +72,4 @@ def test_pages_of_a_shipped_study_have_at_most_two_screens(
     finally:
         if before is not None:
             page.set_viewport_size(before)
-    assert len(measured) == 17
-    assert {name: height for name, height in measured.items() if height > MOST_PX} == {}
+    return measured
