@@ -5,8 +5,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.paper.document import plain
-from analysis.paper.statistics import check_text
 from analysis.report.contents import Contents, DrawnPart, Progress
 from analysis.report.formats import as_markdown
 from analysis.report.latex import NEEDS, as_document, as_latex
@@ -123,6 +121,10 @@ def _latex(contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
 
 def self_check(said: tuple[str, ...]) -> str:
     """What `check-paper` finds in the report's own sentences, in words."""
+    # Here, as commands without a report need none of it.
+    from analysis.paper.document import plain
+    from analysis.paper.statistics import check_text
+
     result = check_text(plain("\n\n".join(said)))
     if not result.statistics:
         return (
