@@ -39,6 +39,7 @@ ScaleOption = Annotated[str | None, typer.Option(help="Ends of the scale, e.g. 1
 def _finite(value: float | None) -> float | None:
     if value is None or isfinite(value):
         return value
+    # typer reads nan and inf as numbers, too.
     raise InputError(f"--against should be a number such as 4, got {value}")
 
 
@@ -97,6 +98,7 @@ def ranks(
 
       analysis ranks ratings.csv --participant id --rating score --against 4 --equivalence 0.5
     """
+    # Imported when the command runs: scipy would slow down every start and all help texts.
     import numpy as np
 
     from analysis.ranks import rank_against, rank_between, rank_within
@@ -104,20 +106,26 @@ def ranks(
 
     data = _levels_of(file, (participant, rating), (within, between), scale, levels)
     bounds = equivalence_bounds(equivalence)
+    # First: with a value, a factor only names samples that are each compared with it.
     if against is not None:
         result = rank_against(data.factor, data.names, data.values, against, bounds)
     elif within:
+        # Columns have equal length, since people without a level were left out.
         result = rank_within(within, data.names, np.column_stack(data.values), bounds)
     elif between:
         result = rank_between(between, data.names, data.values, bounds)
     else:
         raise InputError("expected a factor (--within or --between COLUMN), or a value (--against 4)")
+    # The tests know nothing of how the table was read.
     result = replace(result, decisions=data.decisions)
     save_json(json, asdict(result), data.synthetic)
+    # Before the results, since they limit what these mean.
     show_decisions(result.decisions)
     named = (result, file.stem, data.synthetic)
     show_text(ranks_text(*named))
+    # Medians, as ranks are tested; t tests show means.
     show_figure(partial(_draw_levels, data, rating, "median"))
+    # A comparison with a value has no test of all levels together.
     show_tables(*([levels_table(*named)] if result.test else []), pairs_table(*named))
 
 
@@ -150,6 +158,7 @@ def t_test(
     from analysis.report.rank_tables import mean_tests_table, means_text
     from analysis.t_tests import compare_groups, compare_with_value
 
+    # Pairs within people would need paired tests, which the ANOVA already has.
     if against is None and within:
         raise InputError(
             "--within needs --against VALUE here; pairs of levels within participants are in analysis anova"
@@ -190,6 +199,7 @@ def _levels_of(
     from analysis.within.cell_means import cell_table
     from analysis.within.level_codes import in_given_order
 
+    # Lists, as the readers take any number of factors.
     within, between = ([name] if name else [] for name in factors)
     if within and between:
         raise InputError("expected one factor: either --within COLUMN or --between COLUMN")
@@ -197,14 +207,17 @@ def _levels_of(
     rows, ordered = in_given_order(data.rows, levels or ())
     cells = cell_table(rows, *columns, within)
     decisions = [*data.decisions, *ordered]
+    # Complete cases only: rank tests within participants need every level.
     if cells.dropped:
         gone = ", ".join(one.participant for one in cells.dropped)
         decisions.append(f"excluded because a level has no rating: {gone}")
+    # Without a factor everybody is one sample, named after the rating.
     names: tuple[str, ...] = cells.levels[0] if within else (columns[1],)
     y = cells.y.reshape(len(cells.participants), -1)
     values = [y[:, k] for k in range(len(names))]
     if between:
         groups = design_of(rows, columns[0], cells.participants, between, [])
         names = groups.levels[0]
+        # One mean for each participant: with a factor between people, y has one column.
         values = [y[groups.codes[:, 0] == k, 0] for k in range(len(names))]
     return _Levels(factors[0] or factors[1], names, values, tuple(decisions), data.synthetic)

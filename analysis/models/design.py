@@ -30,6 +30,7 @@ Floats = NDArray[np.float64]
 
 def _sum_coding(levels: int) -> Floats:
     """Contrasts of R's contr.sum with a column of ones before them, (levels, levels)."""
+    # The last level is minus the sum of the others, so that columns sum to 0.
     coding = np.eye(levels)[:, :-1]
     coding[-1] = -1.0
     return np.hstack([np.ones((levels, 1)), coding])
@@ -334,6 +335,7 @@ def model_data(rows: pd.DataFrame, terms: ModelTerms) -> ModelData:
     shape = tuple(len(names) for names in levels)
     cell = np.zeros(len(values), np.int64)
     if factors:
+        # The last factor varies fastest, as the rows of both codings do.
         cell = np.ravel_multi_index(tuple(codes for codes, _ in coded), shape).astype(np.int64)
     if terms.effects is None:
         _refuse_empty_cells(cell, factors, levels)
@@ -516,6 +518,7 @@ def refuse_group_slopes(data: ModelData) -> None:
         effects = data.group_effects(group, "none")[1:]
         for effect in effects:
             columns = pd.DataFrame(data.slope_columns([effect]))
+            # Variation within at least two groups: one alone gives no variance of slopes.
             spread = columns.groupby(group.codes).std(ddof=0).max(axis=1)
             if int((spread > 1e-9).sum()) < 2:
                 raise InputError(
@@ -544,6 +547,7 @@ def _many_covariances(data: ModelData, effects: Sequence[str]) -> list[str]:
 
 def _without_last(data: ModelData, inside: list[str]) -> list[str]:
     """Effects without the highest interaction of factors where each cell has one rating of a participant."""
+    # One number for each pair of participant and cell.
     cells, people = len(data.fixed), data.participants
     counts = np.bincount(people.codes * cells + data.cell, minlength=len(people.names) * cells)
     of_factors = [effect for effect in inside if effect in data.factorial_effects]

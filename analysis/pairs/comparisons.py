@@ -69,6 +69,7 @@ class Comparisons:
         """The comparisons of each question; of all, under an empty name, if there is one question."""
         if self.question is None:
             return {"": self}
+        # Each part has its own items: a question may have been about some of them only.
         return {
             name: self._subset(self.question == name, name) for name in map(str, np.unique(self.question))
         }
@@ -91,6 +92,7 @@ class Comparisons:
     def _subset(self, rows: NDArray[np.bool_], name: str) -> "Comparisons":
         """Some comparisons; items and raters without one are left out."""
         used, sides = np.unique(np.stack([self.left[rows], self.right[rows]]), return_inverse=True)
+        # The shape of the inverse has changed between versions of numpy.
         sides = sides.reshape(2, -1)
         people, raters = self.participant, self.participants
         if people is not None:
@@ -162,12 +164,14 @@ def read_comparisons(
     table = read_text_table(path, roles, EXPORT_COLUMNS)
     for name in (left, right, *more):
         texts_required(table, name)
+    # Ids are compared as text: leading zeros are a part of them.
     columns = {name: table.columns[name].astype(str).to_numpy() for name in roles}
     if same:
         _report_same(table, columns[left] == columns[right])
     else:
         _refuse_same(table, columns[left], columns[right])
     outcome, judged = _outcomes(table, columns[left], columns[right], columns[winner], winner, tie)
+    # An export has practice and failed plays as well; other tables have rows that count only.
     judged = answers_that_count(table, judged, "comparisons", EXPORTED_SIDES)
     items = _items(table.columns[left], table.columns[right], judged)
     orders, said = given_orders({left: items}, levels)
@@ -205,6 +209,7 @@ def _items(left: "pd.Series[Any]", right: "pd.Series[Any]", judged: NDArray[np.b
     """Items of either side: in the order of their codes where both sides have codes, else sorted."""
     names = (*names_in_order(left, judged), *names_in_order(right, judged))
     coded = left.cat.ordered and right.cat.ordered
+    # Text sorts 10 before 2, so codes give the better order where both sides have them.
     return tuple(dict.fromkeys(names)) if coded else tuple(sorted(set(names)))
 
 
@@ -230,18 +235,22 @@ def _outcomes(
     """Return the outcome of each row, and which rows have one."""
     sides = {"left": LEFT, "right": RIGHT}
     names = {*pd.unique(left), *pd.unique(right)}
+    # Then the answer left could mean the side or the item.
     confused = sides.keys() & {name.casefold() for name in names}
     if confused:
         name = min(confused)
         raise InputError(f"{table.source}: an item is called '{name}', like a side; rename the item")
     if tie is not None:
         _refuse_tie(table, tie, names)
+    # -1 marks rows whose outcome is not known yet.
     outcome = np.full(left.size, -1, dtype=np.int64)
+    # A few different answers, though rows may be a million.
     for answer in pd.unique(said):
         if (side := answer.casefold()) in sides:
             outcome[said == answer] = sides[side]
     if tie is not None:
         outcome[said == tie] = TIE
+    # Last: an item whose name is also the word for a tie was refused above.
     outcome[said == left] = LEFT
     outcome[said == right] = RIGHT
     # A mark of a missing value is one only where it is neither an item's name nor the word for a tie.
@@ -305,6 +314,7 @@ def separated_items(comparisons: Comparisons) -> str | None:
     items are parted in two, each part won at least once against the other; a tie counts for both.
     """
     groups = _components(comparisons, strong=True)
+    # Strongly connected: from each item a chain of wins leads to every other.
     if len(groups) == 1:
         return None
     wins = _wins(comparisons)
@@ -318,6 +328,7 @@ def separated_items(comparisons: Comparisons) -> str | None:
             return f"{_named(group)} won every comparison with the others"
         if lost and not won:
             return f"{_named(group)} lost every comparison with the others"
+    # Only without any comparison between groups: otherwise one of them won or lost all.
     return f"{_named(groups[0])} won or lost every comparison with the others"
 
 
@@ -325,6 +336,7 @@ def _wins(comparisons: Comparisons) -> np.ndarray:
     """(k, k): how often the row's item won against the column's, ties for both."""
     wins = np.zeros((len(comparisons.items),) * 2, dtype=np.int64)
     for_left, for_right = comparisons.outcome != RIGHT, comparisons.outcome != LEFT
+    # Not `+=`, which counts a pair that occurs several times only once.
     np.add.at(wins, (comparisons.left[for_left], comparisons.right[for_left]), 1)
     np.add.at(wins, (comparisons.right[for_right], comparisons.left[for_right]), 1)
     return wins
@@ -374,6 +386,7 @@ def transitivity(comparisons: Comparisons) -> Transitivity:
     violations = np.zeros(3, dtype=np.int64)
     triples = 0
     for triple in combinations(range(len(comparisons.items)), 3):
+        # A triple with a pair that nobody compared cannot be judged.
         if all(compared[one, other] for one, other in combinations(triple, 2)):
             triples += 1
             violations += _violations(shares, triple)
@@ -396,6 +409,7 @@ def _violations(shares: NDArray[np.float64], triple: tuple[int, ...]) -> NDArray
     ):
         ab, bc, ac = shares[a, b], shares[b, c], shares[a, c]
         if ab >= 0.5 and bc >= 0.5:
+            # With ties several orders qualify; a triple counts as broken only if every order is.
             best = np.minimum(best, np.array([ac < 0.5, ac < min(ab, bc), ac < max(ab, bc)], dtype=np.int64))
     return best
 
@@ -407,6 +421,7 @@ def _shares(
     size = len(comparisons.items)
     wins, compared = np.zeros((size, size)), np.zeros((size, size))
     left, right, outcome = comparisons.left[rows], comparisons.right[rows], comparisons.outcome[rows]
+    # A tie is half a win for each, so that shares of a pair sum to 1.
     for_left = np.where(outcome == LEFT, 1.0, np.where(outcome == TIE, 0.5, 0.0))
     np.add.at(wins, (left, right), for_left)
     np.add.at(wins, (right, left), 1.0 - for_left)
@@ -436,8 +451,10 @@ def _circles(comparisons: Comparisons) -> tuple[int, int, int]:
     for rater in np.flatnonzero(answers == size * (size - 1) // 2):
         shares, compared = _shares(comparisons, comparisons.participant == rater)
         once = compared[np.triu_indices(size, 1)]
+        # Skips raters with the right number of answers who judged a pair twice, or gave a tie.
         if np.all(once == 1.0) and not np.any(shares == 0.5):
             wins = np.nansum(np.where(np.eye(size, dtype=bool), 0.0, shares), axis=1)
             raters += 1
+            # Rounded: halves and thirds in floating point, but a whole number by definition.
             circles += round(size * (size - 1) * (size - 2) / 6 - float(np.sum(wins * (wins - 1) / 2)))
     return raters, circles, raters * most_each

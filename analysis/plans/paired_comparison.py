@@ -34,6 +34,7 @@ _OUTCOMES = {"left": LEFT, "right": RIGHT, "tie": TIE}
 
 def looked_up(column: pd.Series, values: Mapping[str, float], otherwise: float) -> np.ndarray:
     """The value of each name of a categorical column."""
+    # By category and not by row: a few names, but maybe a million rows.
     of_category = np.array(
         [values.get(str(name), otherwise) for name in column.cat.categories] or [otherwise]
     )
@@ -50,6 +51,7 @@ def cells_of(experiment: Experiment) -> list[tuple[str, tuple[str, ...]]]:
 def comparisons_of(prepared: PlanRows) -> Comparisons:
     """The comparisons as indices; two clips of one cell say nothing about the cells and are excluded."""
     rows, decisions = prepared.rows, list(prepared.decisions)
+    # As text, since the two columns may have different categories.
     same = (rows["left_cell"].astype(str) == rows["right_cell"].astype(str)).to_numpy()
     if same.any():
         decisions.append(f"{same.sum()} comparisons of two clips of one cell excluded from the abilities")
@@ -60,6 +62,7 @@ def comparisons_of(prepared: PlanRows) -> Comparisons:
         )
     decisions += _arrangements(rows)
     shown = {*rows["left_cell"].astype(str), *rows["right_cell"].astype(str)}
+    # In declared order, and only cells that were compared: others have no ability.
     items = tuple(name for name, _ in cells_of(prepared.experiment) if name in shown)
     position = {name: index for index, name in enumerate(items)}
     people, person = np.unique(rows["participant"].astype(str).to_numpy(), return_inverse=True)
@@ -80,6 +83,7 @@ def _arrangements(rows: pd.DataFrame) -> list[str]:
     """Where the two clips were not shown in one way throughout, how often in which."""
     if "arrangement" not in rows.columns:
         return []
+    # Rows without an arrangement have an empty name.
     counts = Counter(name.replace("_", " ") for name in rows["arrangement"].astype(str) if name)
     named = [f"{number} {name}" for name, number in sorted(counts.items())]
     return (
@@ -93,6 +97,7 @@ def factors_of(experiment: Experiment, items: tuple[str, ...]) -> ItemFactors | 
     varied = [
         index
         for index in range(len(experiment.factors))
+        # A factor with one level among the compared cells explains nothing.
         if len({names[index] for names in levels.values()}) > 1
     ]
     if not varied:
@@ -119,6 +124,7 @@ def number_answers(rows: pd.DataFrame) -> pd.DataFrame:
 def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
     """Refuse a winner that is none, a tie where none is declared, and an unknown cell."""
     answers = ["left", "right", *(["tie"] if paired_comparison_of(experiment).ties else [])]
+    # An empty winner is not a mistake of the table: a trial may have no answer.
     refuse_unknown(rows, "winner", [*answers, ""], f"answer ({', '.join(answers)})", source)
     cells = [name for name, _ in cells_of(experiment)]
     for column in ("left_cell", "right_cell"):
@@ -152,6 +158,7 @@ def contents_of_groups(prepared: PlanRows, analyse: Callable[[PlanRows], Content
     experiment, labels = prepared.experiment, labels_of(prepared.experiment)
     made: list[tuple[str, Contents, Comparisons]] = []
     parts: list[Part] = []
+    # In declared order, so that parts of the report are in the same order each time.
     for levels in groups(experiment):
         mine = _of_group(prepared, of_group(experiment, levels))
         name = name_of(levels)
@@ -160,10 +167,12 @@ def contents_of_groups(prepared: PlanRows, analyse: Callable[[PlanRows], Content
             continue
         contents = analyse(mine)
         title = ", ".join(f"{labels.factor(factor)}: {labels.level(factor, one)}" for factor, one in levels)
+        # The key becomes a part of file names, in which a slash is a folder.
         parts += [part.under(name.replace("/", "-"), title) for part in contents.parts]
         made.append((name, contents, comparisons_of(mine)))
     agreement, reason = _agreement(experiment, [comparisons for *_, comparisons in made])
     people = prepared.rows["participant"].astype(str).nunique()
+    # Methods and labels are the same in every group.
     first = made[0][1]
     return replace(
         first,
@@ -171,6 +180,7 @@ def contents_of_groups(prepared: PlanRows, analyse: Callable[[PlanRows], Content
         lead=f"{people} participants in {len(made)} groups, {len(prepared.rows)} comparisons",
         n_participants=people,
         left_out=left_out(prepared.exclusions),
+        # Each decision once: decisions about the whole table come from every group.
         decisions=tuple(dict.fromkeys(said for _, one, _ in made for said in one.decisions)),
         parts=(*parts, _agreement_part(agreement, reason, experiment.name, prepared.synthetic)),
         methods=METHODS + first.methods,
@@ -202,17 +212,21 @@ def _agreement(
     """
     if len(every) < 2:
         return None, "only one group has comparisons"
+    # Cells of different groups are the same once the factors between groups are left out.
     within = [index for index, factor in enumerate(experiment.factors) if not factor.between]
     named = [_without_groups(one, within) for one in every]
+    # Common abilities need common cells.
     if any(set(one.items) != set(named[0].items) for one in named):
         return None, "the groups compared different cells"
     pooled = _together(named)
+    # All models must have the same parameters: with ties in one group, ties in all.
     method: Method = "davidson" if pooled.ties else "bradley-terry"
     try:
         own = [fit_abilities(one, method) for one in named]
         same = fit_abilities(pooled, method)
     except InputError as error:
         return None, str(error)
+    # Rounding may put the sum just below the common fit.
     chi2 = max(0.0, 2 * (sum(one.log_likelihood for one in own) - same.log_likelihood))
     df = (len(every) - 1) * (len(pooled.items) - 1 + (method == "davidson"))
     return LikelihoodRatio(chi2, df, float(stats.chi2.sf(chi2, df))), None
@@ -228,12 +242,14 @@ def _without_groups(one: Comparisons, within: list[int]) -> Comparisons:
 def _together(every: Sequence[Comparisons]) -> Comparisons:
     """The comparisons of all groups, items in the order of the first one."""
     first = every[0]
+    # Groups list their items in different orders.
     codes = [np.array([first.items.index(item) for item in one.items]) for one in every]
     return replace(
         first,
         left=np.concatenate([code[one.left] for code, one in zip(codes, every, strict=True)]),
         right=np.concatenate([code[one.right] for code, one in zip(codes, every, strict=True)]),
         outcome=np.concatenate([one.outcome for one in every]),
+        # The test needs no raters, and the numbers of raters repeat between groups.
         participant=None,
         participants=(),
     )

@@ -42,6 +42,7 @@ def notes_of(result: "MixedResult | OrdinalResult", labels: Labels) -> tuple[str
 
 def _in_labels(note: str, result: "MixedResult | OrdinalResult", labels: Labels) -> str:
     """A note with labels instead of terms; a factor may have the name of a word in the note, such as fit."""
+    # This note lists factors, not effects, so every name is replaced separately.
     if moved := _MOVED.fullmatch(note):
         return ", ".join(map(labels.term, moved["names"].split(", "))) + moved["said"]
     said = {
@@ -53,6 +54,7 @@ def _in_labels(note: str, result: "MixedResult | OrdinalResult", labels: Labels)
         said |= {f"{word} of {effect.effect}": f"{word} of {labels.term(effect.effect)}" for word in _SLOPES}
     # The longest phrase first, or one that begins another would be replaced within it.
     phrases = "|".join(sorted(map(re.escape, said), key=len, reverse=True))
+    # A name next to a word character or a colon is a part of another name.
     return re.sub(rf"(?<![\w:])(?:{phrases})(?!\w|:\w)", lambda one: said[one[0]], note)
 
 
@@ -80,6 +82,7 @@ def fit_with_random(
     every : bool
         Whether participants have slopes of every effect; else of main effects.
     """
+    # Imported when needed: these modules make the start of every command slower.
     import numpy as np
 
     from analysis.models.mixed import fit_mixed
@@ -94,6 +97,7 @@ def fit_with_random(
             # More slopes than the data determine: the next fewer are tried.
             continue
         return fitted, slopes
+    # Intercepts alone are determined wherever a model is: no further fallback.
     return fit_mixed(**arguments, random=random, slopes="all" if every else "main"), "none"
 
 
@@ -103,6 +107,7 @@ def _tried(arguments: dict[str, Any], random: list[str], every: bool) -> "tuple[
     rows, factors = arguments["rows"], [*arguments["within"], *arguments["between"]]
     levels = sum(rows[name].nunique() for name in random)
     small = levels * len(rows[factors].drop_duplicates()) <= MAX_SLOPES
+    # Random factors never get more slopes than participants have.
     return ("all", "main") if every and small else ("main",)
 
 
@@ -110,6 +115,7 @@ def _without_items_of_slopes(arguments: dict[str, Any], random: list[str]) -> di
     """The same without items where each is a cell of a random factor: its slopes hold what they would."""
     rows, items = arguments["rows"], list(arguments["item"])
     own = [name for name in random if name in items]
+    # With two random factors among the items, the cells of neither are the items.
     if len(own) != 1:
         return arguments
     cells = [*own, *arguments["within"], *arguments["between"]]
@@ -119,6 +125,7 @@ def _without_items_of_slopes(arguments: dict[str, Any], random: list[str]) -> di
 
 def holds_for(effect: str, random: list[str], slopes: "RandomSlopes") -> str:
     """For which levels of the random factors a test holds."""
+    # Main slopes vary main effects only: an interaction is tested as if it were the same everywhere.
     tested = slopes == "all" or (slopes == "main" and ":" not in effect)
     names = " and ".join(random)
     return f"others of {names}" if tested else f"the {names} shown"
@@ -165,6 +172,7 @@ def sensitivity_sections(
         progress(title)
         try:
             sections.append(fit(analysis))
+        # A model that cannot be fitted must not cost the reader the rest of the report.
         except InputError as error:
             sections.append(Section(title, f"Not fitted: {error}."))
     return tuple(sections)
@@ -176,6 +184,7 @@ def robust_companions(analysis: Analysis, progress: Callable[[str], None] = lamb
     from analysis.robust import companions_of
 
     progress("robust companions")
+    # A report may have computed them already; the permutations take longest.
     return robust_section(analysis, analysis.robust or companions_of(analysis.anova))
 
 
@@ -197,6 +206,7 @@ def _model_arguments(analysis: Analysis) -> dict[str, Any]:
     if analysis.exclusions is None or analysis.experiment is None:
         raise InputError("models need a declared experiment")
     rows = analysis.exclusions.rows
+    # The ANOVA leaves out incomplete participants; the models must compare with the same people.
     rows = rows[rows["participant"].isin(list(analysis.cells.participants)).to_numpy()]
     return {
         "rows": rows,
@@ -204,6 +214,7 @@ def _model_arguments(analysis: Analysis) -> dict[str, Any]:
         "rating": "response",
         "within": list(analysis.anova.factors),
         "between": list(analysis.anova.between.factors),
+        # An exemplar's number alone is not an item: every level of these factors has a number 1.
         "item": [*analysis.experiment.exemplars.own_per, "exemplar"],
     }
 
@@ -215,6 +226,7 @@ def _random_factors(analysis: Analysis) -> list[str]:
 
 def mixed_model(analysis: Analysis) -> Section:
     """The linear mixed model's tests next to those of the ANOVA."""
+    # More cells would make slopes for every effect take minutes.
     every = len(analysis.cells.cells) <= MAX_CELLS
     random = _random_factors(analysis)
     arguments = _model_arguments(analysis)
@@ -254,6 +266,7 @@ def mixed_model(analysis: Analysis) -> Section:
             f" With more than {MAX_CELLS} cells, slopes for every effect take minutes (analysis mixed fits "
             "them). Without them, the p of interactions is too small if people differ in them."
         )
+    # The R script has no counterpart of slopes for random factors, so none is written.
     if random:
         return Section("Linear mixed model", text, (table,))
     return Section(
@@ -266,6 +279,7 @@ def ordinal_model(analysis: Analysis) -> Section:
     from analysis.models.ordinal import fit_ordinal
 
     arguments = _model_arguments(analysis)
+    # Random factors become a part of the item, so that blinks of two levels are two items.
     random = [name for name in _random_factors(analysis) if name not in arguments["item"]]
     arguments["item"] = [*random, *arguments["item"]]
     every = len(analysis.cells.cells) <= MAX_CELLS
@@ -324,6 +338,7 @@ def bayes_factors(analysis: Analysis) -> Section:
     for pair in (p for p in analysis.pairs if p.effect in names):
         bf = pair.bayes_factor
         name = analysis.labels.pair(pair.cell_a, pair.cell_b)
+        # A factor of 0 has no reciprocal.
         rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
     header = ("Margin: pair", "t", "BF₁₀", "BF₀₁", "Evidence")
     table = Table(
@@ -350,6 +365,7 @@ def _in_words(bf: float) -> str:
     """Jeffreys' words for the strength of evidence."""
     if not isfinite(bf):
         return DASH
+    # One scale serves both directions: evidence against is the reciprocal.
     side, size = ("a difference", bf) if bf >= 1 else ("no difference", 1 / bf if bf > 0 else float("inf"))
     for limit, word in ((3, "weak"), (10, "moderate"), (30, "strong"), (100, "very strong")):
         if size < limit:

@@ -97,12 +97,14 @@ def figures_of(analysis: Analysis) -> tuple[FigureSpec, ...]:
     """The figures of the paper for its experiments; for others each factor, and pairs of factors."""
     known = _OF_EXPERIMENT.get(analysis.name, ())
     factors = set(analysis.anova.all_factors)
+    # A study may share its name with an experiment of the paper and still have other factors.
     if known and all({*spec.along, *([spec.colour] if spec.colour else [])} <= factors for spec in known):
         return known
     names = analysis.anova.all_factors
     if len(names) == 1:
         (key,) = _keys([names])
         return (FigureSpec(key, analysis.labels.factor(names[0]), names),)
+    # Six are all pairs of four factors.
     pairs = list(combinations(names, 2))[:6]
     return tuple(
         FigureSpec(key, f"{analysis.labels.factor(a)} and {analysis.labels.factor(b)}", (a,), b)
@@ -117,6 +119,7 @@ def _keys(shown: Sequence[tuple[str, ...]]) -> list[str]:
         plain = [re.sub(r"[^A-Za-z0-9_-]+", "-", factor).strip("-") or "factor" for factor in factors]
         key = again = f"figure-{'-'.join(plain)}"[:MAX_KEY]
         number = 1
+        # Case is ignored: on some file systems figure-A and figure-a are one file.
         while again.lower() in map(str.lower, keys):
             number += 1
             again = f"{key}-{number}"
@@ -181,6 +184,7 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     n_groups, n_shades = len(groups), len(shades)
     offsets = (np.arange(n_shades) - (n_shades - 1) / 2) * _SPREAD / n_shades
     room = _SPREAD / n_shades
+    # With clouds, points move to the left and leave the right half to the cloud.
     jitter = (
         0.16 * spread_offsets(len(values)) - 0.24
         if spec.style == "points"
@@ -189,6 +193,7 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     for shade in range(n_shades):
         at = np.arange(n_groups) + offsets[shade]
         colour = COLOURS[shade % len(COLOURS)]
+        # Thin lines connect the conditions of a participant; one group has nothing to connect.
         if n_groups > 1:
             people = at[:, None] + jitter[None, :]
             axes.plot(people, values[:, :, shade].T, color=colour, alpha=0.12, linewidth=0.5, zorder=1)
@@ -254,13 +259,16 @@ def _arranged(analysis: Analysis, spec: FigureSpec) -> _Shown:
     order = [of_margin.names.index(name) for name in named]
     members = tuple(m for m, name in enumerate(result.factors) if name in named)
     own = _by_group(result, [name for name in of_margin.names if name not in result.factors])
+    # Times 1 or NaN: each participant has values only in the columns of the own group.
     values = (own[:, :, None] * margin(result, members)[:, None, :]).reshape(-1, *sizes)
     means = of_margin.means.reshape(sizes)
     if _of_participants_alone(analysis):
         flat = values.reshape(len(values), -1).tolist()
+        # These are standard errors; `reach` makes them half the width of an interval.
         errors = np.array(within_participant_errors(flat)).reshape(sizes)
         reach = float(special.stdtrit(len(values) - 1, 0.975))
     else:
+        # Identity weights: every mean is a contrast, and its standard error comes second.
         errors = of_margin.contrasts(np.eye(means.size))[1].reshape(sizes)
         reach = float(special.stdtrit(of_margin.df, 0.975))
     combinations_along = list(product(*(levels[name] for name in spec.along)))
@@ -284,6 +292,7 @@ def _by_group(result: AnovaResult, factors: Sequence[str]) -> Floats:
     at = [design.factors.index(name) for name in factors]
     sizes = [len(design.levels[k]) for k in at]
     own = np.zeros(result.n_participants, np.int64)
+    # Without factors between participants everyone is in the one group, 0.
     if at:
         own = np.ravel_multi_index(tuple(design.codes[:, k] for k in at), sizes).astype(np.int64)
     marks = np.full((result.n_participants, int(np.prod(sizes, initial=1))), np.nan)
@@ -362,6 +371,7 @@ def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Pi
     with mpl.rc_context(STYLE):
         figure = new_figure(7.2, 2.0 + 0.34 * size)
         axes = figure.add_subplot()
+        # Fixed ends put the pale middle of the color map at 0.5, no preference.
         drawn = axes.imshow(shares, cmap="PuOr", vmin=0, vmax=1)
         axes.set_xticks(range(size), names, rotation=30, ha="right")
         axes.set_yticks(range(size), names)
@@ -369,6 +379,7 @@ def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Pi
         axes.set_ylabel("chosen")
         for (row, column), share in np.ndenumerate(shares):
             if np.isfinite(share) and size <= NUMBERED_MAX:
+                # Both ends of the color map are dark.
                 ink = "white" if abs(share - 0.5) > 0.3 else "black"
                 axes.text(column, row, f"{share:.2f}", ha="center", va="center", fontsize=8, color=ink)
         axes.spines[:].set_visible(False)
@@ -411,6 +422,7 @@ def traces_figure(
     panels[0].set_ylim(low - (MARKS_SHARE + 0.04) * (high - low), high)
     for panel in panels[::columns]:
         panel.set_ylabel("Rating")
+    # Shared axes label the lowest row only; above an empty place the panel needs labels, too.
     for panel in panels[max(0, len(traces) - columns) : len(traces)]:
         panel.set_xlabel("Time in the clip in s" + (", less the lag" if earlier_s else ""))
         panel.tick_params(labelbottom=True)
@@ -471,10 +483,12 @@ def residuals_figure(checks: ResidualChecks, synthetic: bool) -> Picture:
     over, normal, uniform = figure.subplots(1, 3)
     dots: dict[str, Any] = {"s": 6, "color": COLOURS[0], "alpha": 0.4, "linewidth": 0}
     over.scatter(fitted[shown], residuals[shown], **dots)
+    # Bins of equal size: each mean rests on as many ratings.
     bins = np.array_split(np.argsort(fitted, kind="stable"), min(10, len(fitted)))
     means = [(fitted[rows].mean(), residuals[rows].mean()) for rows in bins]
     over.plot(*np.transpose(means), color=COLOURS[1])
     over.set(xlabel="Fitted value", ylabel="Standardized residual")
+    # Hazen's plotting positions, (i - 0.5) / n.
     places = (np.arange(len(residuals)) + 0.5) / len(residuals)
     normal.scatter(special.ndtri(places)[shown], np.sort(residuals)[shown], **dots)
     normal.set(xlabel="Normal quantile", ylabel="Residual quantile")
@@ -526,6 +540,7 @@ def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
         declared = next(at for at, universe in enumerate(order) if universe.declared)
         for axes in (upper, lower):
             axes.axvline(declared, color="#999999", linewidth=5, alpha=0.25, zorder=0)
+        # N is the first key of the order, so the ends have the extremes.
         low, high = order[-1].n_participants, order[0].n_participants
         note = f"Each column is one choice of exclusion rules, N from {high} to {low}; shaded: as declared."
         if len(drawn) < p.shape[1]:
@@ -567,6 +582,7 @@ def _tests(axes: Axes, p: np.ndarray, names: list[str]) -> None:
     axes.set_ylim(SMALLEST_P * 0.7, 1.3)
     ticks = [SMALLEST_P, 0.001, 0.01, SIGNIFICANCE, 0.1, 1]
     axes.set_yticks(ticks, ["≤ .0001", ".001", ".01", ".05", ".1", "1"])
+    # Minor ticks of a logarithmic axis would add labels between those set above.
     axes.minorticks_off()
     axes.set_ylabel("p", style="italic")
     axes.legend(**BESIDE, frameon=False, fontsize=7)

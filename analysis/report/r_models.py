@@ -50,16 +50,20 @@ def model_files(
     from analysis.models.random_part import MixedResult
 
     is_mixed = isinstance(model, MixedResult)
+    # An SD at its limit means that the likelihood rises without an end.
     if not is_mixed and max(c.sd for c in model.components) > SD_MAX - 1e-6:
         return {}
     kind = "mixed" if is_mixed else "ordinal"
     slopes = [c.term for c in model.components if c.group == "participant" and c.term != "intercept"]
     levels = dict(zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True))
+    # lmer gives each contrast of three levels or more its own variance; ours share one.
     shared = any(len(levels[name]) > 2 for slope in slopes for name in slope.split(":"))
     own = "-".join(part for part in (key, kind) if part)
     script, data = f"{own}-{SCRIPT}", f"{own}-ratings.csv"
+    # Short codes: names of factors may hold what a formula cannot.
     names = {name: f"f{i}" for i, name in enumerate(model.factors, start=1)}
     coded = (", ".join(f'"{names[name]}"' for name in slope.split(":")) for slope in slopes)
+    # Satterthwaite needs the curvature of the likelihood, which has none at a bound.
     with_df = isinstance(model, MixedResult) and not shared and not model.singular
     text = fill_template(
         "verify-models.R.j2",
@@ -87,6 +91,7 @@ def _printed_mixed(model: "MixedResult", names: dict[str, str], with_df: bool) -
     """Criterion, F, and df where lmerTest has them: not of shared variances, nor at a bound."""
     rows: Rows = [["mixed criterion", "REML", r_number(model.reml_criterion)]]
     for effect in model.effects:
+        # Sorted: R orders the members of an interaction by its own rules.
         label = ":".join(sorted(names[part] for part in effect.effect.split(":")))
         rows.append(["mixed F", label, r_number(effect.f_value)])
         if with_df:
@@ -123,6 +128,7 @@ def _r_columns(
 ) -> list[str]:
     """R's names of the sum-coded coefficients, in the order of those here: R has f2:f3 before f1:f4."""
     return [
+        # Sum coding has one column fewer than levels, numbered from 1 in R.
         ":".join(f"{names[model.factors[m]]}{k}" for m, k in zip(members, codes, strict=True))
         for members in effect_members(len(model.factors))
         for codes in product(*(range(1, len(levels[model.factors[m]])) for m in members))
@@ -137,6 +143,7 @@ def _grouping(name: str) -> str:
 
 def _spreads(model: "OrdinalResult") -> list[tuple[str, float]]:
     """Standard deviations as named in the script: a group's intercept by name, slopes by number."""
+    # Numbers, as terms of slopes have other names in R.
     slopes = count(1)
     return [
         (_grouping(c.group) if c.term == "intercept" else str(next(slopes)), c.sd) for c in model.components
@@ -154,6 +161,7 @@ def _ratings(
     rows: pd.DataFrame = arguments["rows"]
     items = rows.groupby(list(arguments["item"]), sort=False, observed=True, dropna=False).ngroup()
     columns: list[list[Any]] = [
+        # R counts from 1.
         (pd.factorize(rows["participant"].astype(str))[0] + 1).tolist(),
         (items + 1).tolist(),
     ]
@@ -186,6 +194,7 @@ def pairs_files(
     text = fill_template(
         "verify-pairs.R.j2",
         **head_of_script(title, script, data),
+        # A line break in a name would end the comment or string it is written into.
         items=[" ".join(name.split()) for name in comparisons.items],
         ties=ties,
         raters=len(comparisons.participants) > 1,
@@ -207,6 +216,7 @@ def _choices(comparisons: Comparisons, ties: bool) -> Rows:
     asked, at = np.unique(
         np.stack([rater, comparisons.left, comparisons.right], axis=1), axis=0, return_inverse=True
     )
+    # A column for ties only where there are any, as the script expects.
     outcomes = np.zeros((len(asked), 3 if ties else 2), dtype=np.int64)
     np.add.at(outcomes, (at.ravel(), comparisons.outcome), 1)
     # R counts from 1.
@@ -244,6 +254,7 @@ def _printed_pairs(comparisons: Comparisons, findings: Findings) -> Rows:
         rows += [["advantage of a side", "se", findings.order.se]]
     if findings.factors is not None:
         tests = findings.factors.factors
+        # The last test is of the fit of all factors together.
         keys = [*range(1, len(tests)), "fit"]
         rows += [["factor chi2", name, test.chi2] for name, test in zip(keys, tests, strict=True)]
     return [[table, name, r_number(value)] for table, name, value in rows]
@@ -265,6 +276,7 @@ def threshold_files(
         return {}
     script, data = (f"{key}-{name}" if key else name for name in (SCRIPT, "trials.csv"))
     people = _people(answers)
+    # All series of a study declare the same function, so any fit shows it.
     example = next(fit for one in fitted.values() if one.result for fit in one.result.pooled.values())
     printed, pooled, persons, thresholds = _printed_thresholds(fitted, people)
     codes = {one.label: name for name, one in fitted.items()}
@@ -280,8 +292,10 @@ def threshold_files(
         series=[{"key": name, "label": " ".join(one.label.split())} for name, one in fitted.items()],
         shape=example.shape,
         guess=r_number(example.guess),
+        # NA: the lapse rate was fitted, and the script fits it, too.
         lapse="NA" if example.lapse_fitted else r_number(example.lapse),
         falling="TRUE" if example.falling else "FALSE",
+        # An empty c() is NULL in R; one empty text keeps it a vector of texts.
         pooled=", ".join(f'"{name}"' for name in pooled) or '""',
         people=", ".join(f'"{name}"' for name in persons) or '""',
         differences=bool(couples),
@@ -334,11 +348,13 @@ def _printed_thresholds(
 def _printed_fit(label: str, fit: "Threshold", trials: "Trials") -> Rows:
     """Threshold and spread; not the spread of a step, which the likelihood hardly depends on."""
     steps = np.diff(np.unique(trials.x))
+    # Slope times the least distance between stimuli: the rise from one to the next.
     is_step = bool(steps.size) and abs(fit.slope) * float(steps.min()) > STEEPEST
     return [["threshold", label, fit.threshold], *([] if is_step else [["spread", label, fit.spread]])]
 
 
 def _is_settled(fit: "Threshold") -> bool:
+    # Notes of the fit say that its maximum is not unique; R may then end elsewhere.
     return not any("no upper limit" in note or "hardly change" in note for note in fit.notes)
 
 
@@ -352,6 +368,7 @@ def _trials(fitted: "dict[str, SeriesFit]", answers: "dict[str, Answers]", peopl
             else [people[str(p)] for p in given.participant]
         )
         keys, at = np.unique(
+            # One key of person and stimulus; `!r` keeps every digit of the stimulus.
             np.array([f"{rater} {x!r}" for rater, x in zip(person, given.x.tolist(), strict=True)]),
             return_inverse=True,
         )
@@ -396,6 +413,7 @@ def verify_with_r(files: Sequence[Path], say: Callable[[str], None] = lambda _: 
     scripts = [path for path in files if path.name.endswith(SCRIPT)]
     if not scripts:
         raise InputError("--verify-with-r: this kind of report has no R script yet")
+    # Models last: they take minutes, and the other answers come at once.
     for path in sorted(scripts, key=_is_model):
         if _is_model(path):
             say(path.name)
@@ -408,6 +426,7 @@ def _is_model(script: Path) -> bool:
 
 def _run(script: Path) -> str:
     told = subprocess.run(  # noqa: S603 - the project's own script, in a folder that the caller chose
+        # No profile of the user may change what the script loads.
         [rscript(), "--vanilla", script.name],
         # R's messages in English, whatever the computer's language: they are searched below.
         env={**os.environ, "LC_ALL": "C.UTF-8"},
@@ -417,6 +436,7 @@ def _run(script: Path) -> str:
         check=False,
     )
     if told.returncode != 0:
+        # "rror" finds both Error and error.
         said = [
             line for line in (told.stdout + told.stderr).splitlines() if "DIFFER" in line or "rror" in line
         ]

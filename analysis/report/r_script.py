@@ -24,6 +24,7 @@ from analysis.within.simple_effects import SimpleEffect
 
 def r_number(value: float | None) -> str:
     """A number as R reads it; NA where there is none."""
+    # `repr` has every digit: R compares to 1e-8, and a rounded number would differ.
     return "NA" if value is None or not np.isfinite(value) else repr(float(value))
 
 
@@ -36,6 +37,7 @@ def as_csv(rows: Iterable[Sequence[Any]]) -> str:
 
 def head_of_script(title: str, script: str, data: str) -> dict[str, str]:
     """What every script says first: of which report it is, who wrote it, its name and its data."""
+    # A title over several lines would end the comment that it is written into.
     return {"title": " ".join(title.split()), "version": version("palpebra"), "script": script, "data": data}
 
 
@@ -70,6 +72,7 @@ def sizes(analysis: Analysis, names: Names) -> dict[str, Any]:
 
 
 def _effect(effect: Effect, names: Names) -> list[str]:
+    # None of a test with one contrast: its univariate F is exact already.
     several = effect.multivariate
     exact = several is not None and several.exact and bool(effect.within)
     numbers = [effect.eta_sq_partial, effect.omega_sq_partial, *effect.eta_sq_partial_ci]
@@ -82,11 +85,13 @@ def _effect(effect: Effect, names: Names) -> list[str]:
 
 
 def _of_one_factor(analysis: Analysis, names: Names) -> list[Pair]:
+    # `names` holds single factors; pairs of cells of several factors have another key.
     return [pair for pair in analysis.pairs if pair.effect in names]
 
 
 def _pair(analysis: Analysis, pair: Pair, names: Names) -> list[Any]:
     levels = dict(zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True))[pair.effect]
+    # R counts from 1.
     positions = [levels.index(name) + 1 for name in (pair.level_a, pair.level_b)]
     numbers = (pair.t, pair.df, pair.dz, *pair.dz_ci, pair.bayes_factor)
     return [names[pair.effect], *positions, *map(r_number, numbers)]
@@ -95,6 +100,7 @@ def _pair(analysis: Analysis, pair: Pair, names: Names) -> list[Any]:
 def _equivalence(analysis: Analysis, names: Names) -> str:
     """Tests of the factors all of whose pairs have one, which are those that R has."""
     rows = []
+    # R tests all pairs of a factor at once, so a part of them cannot be compared.
     for name, levels in zip(analysis.anova.all_factors, analysis.anova.all_levels, strict=True):
         tests = [test for test in analysis.equivalence if test.effect == name]
         if len(tests) == len(list(combinations(levels, 2))):
@@ -107,6 +113,7 @@ def _equivalence(analysis: Analysis, names: Names) -> str:
 
 SCRIPT, DATA = "verify.R", "cell-means.csv"
 
+# Plain ASCII without dots: such a name needs no backticks in a formula.
 _R_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _TAKEN = frozenset(
     {"participant", "mean", "T", "F", "TRUE", "FALSE", "NA", "NULL", "if", "else", "for", "in", "function"}
@@ -147,6 +154,7 @@ def safe_names(analysis: Analysis) -> dict[str, str]:
     names: dict[str, str] = {}
     for i, name in enumerate(own, start=1):
         fits = (
+            # Case is ignored, so that two names never differ by it alone.
             _R_NAME.fullmatch(name) and name not in _TAKEN and name.casefold() not in map(str.casefold, names)
         )
         names[name] = name if fits else f"variable_{i}"
@@ -158,6 +166,7 @@ def _factors(analysis: Analysis) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def _factor(name: str, levels: Sequence[str]) -> dict[str, str]:
+    # Level names are text inside R strings: quotes and backslashes are escaped.
     texts = ", ".join('"' + level.replace("\\", "\\\\").replace('"', '\\"') + '"' for level in levels)
     return {"name": name, "texts": texts, "codes": ", ".join(f'"l{i}"' for i in range(1, len(levels) + 1))}
 
@@ -178,6 +187,7 @@ def design_in_r(analysis: Analysis, names: dict[str, str]) -> dict[str, Any]:
 
 def formula_in_r(analysis: Analysis, names: dict[str, str]) -> str:
     """The formula of the ANOVA as afex takes it."""
+    # The first term is the intercept, which R adds by itself.
     between = [":".join(names[part] for part in term) for term in analysis.anova.between.terms[1:]]
     within = "*".join(names[name] for name in analysis.anova.factors)
     error = f"Error(participant/({within}))" if within else "Error(participant)"
@@ -190,6 +200,7 @@ def _data(analysis: Analysis, names: dict[str, str]) -> str:
     rows = []
     for i, participant in enumerate(analysis.cells.participants):
         groups = [levels[code] for levels, code in zip(design.levels, design.codes[i], strict=True)]
+        # Centered as in our tables: with type III, tests of factors depend on where 0 lies.
         numbers = [repr(float(c.values[i] - c.centre)) for c in design.covariates]
         for at in np.ndindex(anova.y.shape[1:]):
             cell = [levels[k] for levels, k in zip(anova.levels, at, strict=True)]
@@ -202,6 +213,7 @@ def _effects(analysis: Analysis, names: dict[str, str]) -> str:
     for effect in analysis.anova.effects:
         test = effect.univariate
         name = ":".join(names[part] for part in (*effect.between, *effect.within))
+        # One contrast is always spherical: R reports no epsilon for it, either.
         epsilon = test.epsilon_gg if test.df_effect > 1 and effect.within else None
         rows.append(
             [name, *map(r_number, (test.f_value, test.df_effect, test.df_error, test.p_value, epsilon))]
@@ -223,6 +235,7 @@ def _means(analysis: Analysis, names: dict[str, str]) -> str:
     rows = [
         [
             _in_r(tuple(mean.levels), names),
+            # Codes, not names: cells are joined by colons, which a name may contain.
             _cells(analysis, tuple(mean.levels))[tuple(mean.levels.values())],
             *map(r_number, (mean.mean, mean.se, *mean.ci)),
         ]
@@ -257,6 +270,7 @@ def _adjusted(analysis: Analysis, names: dict[str, str]) -> str:
         [
             _in_r(margins[pair.effect], names),
             *map(r_number, (pair.p, pair.p_bonferroni, pair.p_holm, pair.p_sidak, pair.p_fdr)),
+            # What Studentized ranges need besides p: t, its df and the number of means.
             *map(r_number, (pair.t, pair.df, len(_cells(analysis, margins[pair.effect])), pair.p_tukey)),
         ]
         for pair in analysis.pairs
@@ -284,6 +298,7 @@ def _pillai(analysis: Analysis, names: dict[str, str]) -> str:
 def _levels_held(analysis: Analysis, names: dict[str, str], simple: SimpleEffect) -> str:
     """The levels at which a simple effect is tested, as codes."""
     levels = dict(_factors(analysis))
+    # Codes l1, l2, ... in place of names, which may hold quotes.
     at = (f'{names[name]} = "l{levels[name].index(level) + 1}"' for name, level in simple.at.items())
     return f"list({', '.join(at)})"
 
@@ -297,6 +312,7 @@ def _simple(analysis: Analysis, names: dict[str, str]) -> str:
         if exact is not None:
             numbers = (exact.f_value, exact.df_effect, exact.df_error, exact.p_value)
         within = simple.of in analysis.anova.factors
+        # R has separate functions for the three; the word selects one.
         how = ("exact" if exact is not None else "corrected") if within else "between"
         rows.append([names[simple.of], *map(r_number, numbers), how])
     return as_csv(rows).strip()
@@ -345,6 +361,7 @@ def _ranks(analysis: Analysis, companions: Companions, names: dict[str, str]) ->
     rows = []
     for test in companions.ranks:
         factors = analysis.anova.effect(test.effect).factors
+        # Without a correction R has none to compare: NA leaves the number out.
         epsilon = test.epsilon_gg if test.epsilon_gg < 1 else float("nan")
         numbers = (test.f_value, test.df_effect, test.df_error, test.p_value, epsilon)
         rows.append([":".join(names[part] for part in factors), *map(r_number, numbers)])

@@ -45,6 +45,7 @@ def contents_of(
     experiment, trial = prepared.experiment, threshold_of(prepared.experiment)
     name, synthetic = experiment.name, prepared.synthetic
     people = prepared.rows["participant"].astype(str).nunique()
+    # Tables and sentences are those of one study with conditions: a series is a condition here.
     merged, number = merge(fits), len(prepared.rows)
     axis = experiment.factor(trial.stimulus.factor).label
     return Contents(
@@ -60,8 +61,10 @@ def contents_of(
             Part(
                 _tables(fits, merged, differences, name, synthetic),
                 sentences(fits, merged, differences),
+                # A function, so that a report without figures never loads matplotlib.
                 draw=lambda: (draw(fits, axis, synthetic, people),),
                 beside=lambda key: _r_files(prepared, fits, differences, key),
+                # Without the series that could not be fitted: those are in the full report.
                 brief=sentences((), merged, differences),
             ),
         ),
@@ -86,6 +89,7 @@ def merge(fits: "Sequence[SeriesFit]") -> ThresholdsResult:
     """The fits of all series as one result, a condition a series."""
     done = [(fit.label, fit.result) for fit in fits if fit.result is not None]
     return ThresholdsResult(
+        # "all" is the only condition of a series that is fitted by itself.
         {label: result.pooled["all"] for label, result in done},
         tuple(replace(one, condition=label) for label, result in done for one in result.people),
         tuple(replace(mean, condition=label) for label, result in done for mean in result.means),
@@ -101,6 +105,7 @@ def _tables(
     name: str,
     synthetic: bool,
 ) -> tuple[Table, ...]:
+    # Means over people first: they are the result; pooled fits flatten the slope.
     made = [means_table(merged, name, synthetic)] if merged.means else []
     if differences:
         made.append(differences_table(differences, name, synthetic))
@@ -113,9 +118,11 @@ def _tables(
 
 def differences_table(differences: "Sequence[Difference]", name: str, synthetic: bool) -> Table:
     """Series compared within people."""
+    # The standard error of each difference decides how many decimals all have.
     digits = decimals(abs(d.difference / d.t) if d.t else None for d in differences)
     rows = tuple(
         (
+            # Thresholds are the default; only differences in something else are named.
             f"{d.first} - {d.second}" + ("" if d.what == "threshold" else f", {d.what}"),
             str(d.people),
             fixed(d.difference, digits),
@@ -144,6 +151,7 @@ def shares_table(fits: "Sequence[SeriesFit]", name: str, synthetic: bool) -> Tab
     )
     header = ("Series", "Stimulus", "Trials", "Yes or correct", "Share")
     title = caption("Answers at each stimulus", name, synthetic)
+    # A staircase visits many stimuli; a long table starts folded.
     return Table("threshold-shares", title, header, rows, 1, (), folded=len(rows) > 24)
 
 
@@ -154,6 +162,7 @@ def sentences(
     said = [f"{fit.label}: no function was fitted: {fit.reason}." for fit in fits if fit.reason]
     means, digits = {mean.condition: mean for mean in merged.means}, threshold_decimals(merged)
     for label, fit in merged.pooled.items():
+        # A mean exists only where several people have a threshold.
         if label in means:
             mean = means[label]
             low, high = fixed(mean.ci_low, digits), fixed(mean.ci_high, digits)
@@ -170,6 +179,7 @@ def sentences(
 def difference_sentence(d: "Difference") -> str:
     """What a comparison of two series says."""
     verdict = "differed" if d.p_holm < SIGNIFICANCE else "did not differ significantly"
+    # The brackets follow a p, so only the number is repeated.
     corrected = apa_p(d.p_holm).removeprefix("p ")
     return (
         f"{d.what.capitalize()}s {verdict} between {d.first} and {d.second}, "
@@ -185,6 +195,7 @@ def numbers(
     people: int,
 ) -> dict[str, Any]:
     """The JSON document; conditions are the series' names."""
+    # Labels may be translated and change; names in the JSON do not.
     names = {fit.label: fit.name for fit in fits}
     return {
         **study_data(prepared, people),
@@ -204,7 +215,9 @@ def numbers(
 
 def curve(fit: Threshold, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Share of positive answers at each x by the fitted function."""
+    # The spread is fitted as a logarithm, which keeps it above 0.
     rise = function(fit.shape, x, fit.threshold, float(np.log(fit.spread)))
+    # Where high stimuli are hard (falling), the function is mirrored, guess and lapse are not.
     share: NDArray[np.float64] = fit.guess + (1 - fit.guess - fit.lapse) * (1 - rise if fit.falling else rise)
     return share
 
@@ -229,12 +242,14 @@ def draw(fits: "Sequence[SeriesFit]", along: str, synthetic: bool, people: int) 
         axes = figure.add_subplot()
         for position, fit in enumerate(fits):
             colour, trials = COLOURS[position % len(COLOURS)], fit.trials
+            # A root, or stimuli with few trials would be too small to see.
             sizes = 8 + 60 * np.sqrt(trials.n / max(1.0, float(trials.n.max())))
             marker = MARKERS[position % len(MARKERS)]
             shares = trials.k / trials.n
             axes.scatter(trials.x, shares, s=sizes, color=colour, marker=marker, alpha=0.6, label=fit.label)
             if fit.result is not None:
                 of_all = fit.result.pooled["all"]
+                # Only over the stimuli shown: beyond them the function is a guess.
                 x = np.linspace(float(trials.x.min()), float(trials.x.max()), 200)
                 axes.plot(x, curve(of_all, x), color=colour, linewidth=1.3)
                 axes.axvline(of_all.threshold, color=colour, linewidth=0.8, linestyle=":")

@@ -23,6 +23,7 @@ FOLDER = Path(__file__).parent
 MarginLevels = dict[str, str]
 """Levels that name a margin or a cell, e.g. `{blur: MB, amplitude: FC}`; other factors are averaged over."""
 
+# Text, since 4.80 and 4.8 are known to different precision.
 Printed = Annotated[str, Field(pattern=r"^[<>]?\d+(\.\d+)?$")]
 
 
@@ -129,8 +130,10 @@ def decimals(printed: str) -> int:
 def window(printed: str) -> tuple[float, float]:
     """Values that print as this figure; open-ended for `<0.001` and `>0.05`."""
     if printed[0] in "<>":
+        # A printed p is positive, so below a bound it begins at 0.
         bound = float(printed[1:])
         return (0.0, bound) if printed[0] == "<" else (bound, float("inf"))
+    # Half of the last printed digit.
     half = 0.5 * 10.0 ** -decimals(printed)
     return float(printed) - half, float(printed) + half
 
@@ -139,6 +142,7 @@ def prints_as(value: float, printed: str) -> bool:
     """Whether `value` rounds to the printed figure, or lies beyond the bound of `<0.001`, `>0.05`."""
     if printed[0] in "<>":
         low, high = window(printed)
+        # A bound itself is not below or above itself.
         return low < value < high
     # As texts, since decimals such as 4.85 are not exact in binary.
     return f"{value:.{decimals(printed)}f}" == f"{float(printed):.{decimals(printed)}f}"
@@ -184,6 +188,7 @@ class DesignSpace:
         block = np.ones((1, 1))
         for axis, size in enumerate(self.shape):
             basis = orthonormal_basis(size)
+            # The first column of a basis is constant: factors outside an effect are averaged.
             block = np.asarray(np.kron(block, basis[:, 1:] if axis in members else basis[:, :1]))
         return block
 
@@ -193,6 +198,7 @@ class DesignSpace:
         for factor, level in at.items():
             self._check(factor, level)
         for factor, names in zip(self.factors, self.levels, strict=True):
+            # A factor that is not named is averaged over its levels.
             chosen = [at[factor]] if factor in at else list(names)
             weight = np.asarray(np.kron(weight, np.array([name in chosen for name in names]) / len(chosen)))
         return weight
@@ -213,6 +219,7 @@ class DesignSpace:
     def effect_called(self, name: str) -> str:
         """The effect whose factors are those of `name`, in the design's own order."""
         factors = name.split(":")
+        # blur:amplitude and amplitude:blur are one effect.
         for effect in self.effects:
             if sorted(effect.split(":")) == sorted(factors):
                 return effect
@@ -239,11 +246,13 @@ def with_wishes(
     """
     wished_means = [_mean(text, space) for text in means]
     wished_tests = [_test(text, space) for text in effects]
+    # By factors: a wish about a factor makes printed orders and pairs of that factor doubtful.
     touched = [frozenset(m.at) for m in wished_means] + [frozenset(t.effect.split(":")) for t in wished_tests]
     if not touched:
         return published
     places = [m.at for m in wished_means]
     named = {t.effect for t in wished_tests}
+    # F = 0 wants equal means, which printed means of that effect contradict.
     gone = [frozenset(t.effect.split(":")) for t in wished_tests if float(t.f or 1) == 0]
     update = {
         "means": (*_kept(published.means, places, gone), *wished_means),
@@ -256,6 +265,7 @@ def with_wishes(
         "invented_means": tuple(
             m
             for m in published.invented_means
+            # An invented mean gives way to a wish about the same place or a part of it.
             if not any(set(m.at) <= set(p) for p in places) and not any(g <= set(m.at) for g in gone)
         ),
     }
@@ -278,12 +288,15 @@ def _factors(direction: Direction) -> set[str]:
 
 def _mean(text: str, space: DesignSpace) -> PrintedMean:
     place_text, sign, value = text.rpartition("=")
+    # From the right, since names of factors may contain dots.
     parts = [part.strip().rpartition(".") for part in place_text.split(",")]
     if not sign or not all(factor and level for factor, _, level in parts):
         raise InputError(f"expected a mean as factor.level=4.80, got '{text}'")
     at = {factor: level for factor, _, level in parts}
+    # Only for its errors about unknown factors and levels.
     space.weights(at)
     number = _number(value, text)
+    # At least two decimals: a wish for 4.8 means 4.80, not anything from 4.75 to 4.85.
     return PrintedMean(at=at, printed=f"{number:.{max(2, decimals(value.strip()))}f}")
 
 
@@ -302,6 +315,7 @@ def _number(value: str, text: str) -> float:
         number = float(value)
     except ValueError:
         raise InputError(f"expected a number after '=', got '{text}'") from None
+    # Refuses NaN as well, with which every comparison is false.
     if not 0 <= number < 1e6:
         raise InputError(f"expected a number from 0 to a million after '=', got '{text}'")
     return number

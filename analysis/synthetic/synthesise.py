@@ -49,18 +49,22 @@ def make_population(
     """
     means = _cell_means(published, space, targets)
     variances: dict[str, Floats] = {}
+    # Names of targets begin with the statistic; effects of the design have the plain name.
     tests = {t.name.removeprefix("F "): t for t in targets.tests}
     for effect, contrasts in space.effects.items():
         q = contrasts.shape[1]
         z = contrasts.T @ means
         target = tests.get(effect)
+        # An F below 0.01 counts as no effect: as a ratio it would need huge error variances.
         is_zero = target is not None and target.start is not None and target.start < 0.01
         if is_zero:
             means, z = means - contrasts @ z, np.zeros(q)
+        # Printed means say nothing of this effect.
         elif z @ z < 1e-6:
             z = rng.normal(size=q) * published.contrast_sd / np.sqrt(targets.n)
             if published.assumed and target is not None and target.start is not None:
                 z *= (
+                    # The length of z that gives the wanted F with error variances of contrast_sd squared.
                     np.sqrt(target.start * q / (targets.n - q) * (targets.n - 1) / (z @ z))
                     * published.contrast_sd
                 )
@@ -73,11 +77,13 @@ def make_population(
 
 def _cell_means(published: PublishedFigures, space: DesignSpace, targets: Targets) -> Floats:
     means = np.full(space.n_cells, published.grand_mean)
+    # The pseudoinverse gives the least change of the cells that meets the wanted means.
     if published.invented_means:
         rows = np.stack([space.weights(m.at) for m in published.invented_means])
         means = means + np.linalg.pinv(rows) @ (
             np.array([m.mean for m in published.invented_means]) - rows @ means
         )
+    # After the invented ones, so that printed means hold where both speak.
     if targets.means:
         rows = np.stack([t.weights for t in targets.means])
         middle = np.array([(t.low + t.high) / 2 for t in targets.means])
@@ -106,10 +112,12 @@ def _error_variance(z: Floats, target: TestTarget | None, n: int, sd: float, sha
     if f is None:
         present = n / (n - 1) * float(z @ z) / sd**2 * (n - q) / q
         if not target.low <= present <= target.high:
+            # Below a bound half of it leaves room for rounding; above one, half more.
             f = target.high * NEVER_ABOVE if present > target.high else max(target.low * 1.5, 1e-6)
     if f is None or f <= 0.01:
         return usual
     ratio = n / (n - 1) / (f * q / (n - q))
+    # One contrast: the two terms below coincide, whatever the share.
     if q == 1:
         return np.array([[ratio * float(z @ z)]])
     return (1 - share) * ratio * float(z @ z) * np.eye(q) + share * ratio * np.outer(z, z)
@@ -125,6 +133,7 @@ def _covariance(
     variances_needed = [
         ((s.low + s.high) / 2) ** 2 - float(s.weights @ effects @ s.weights) for s in targets.spreads
     ]
+    # Several printed SDs: the grand mean takes their middle, `together` takes the rest.
     grand = float(np.mean(variances_needed)) if variances_needed else published.grand_sd**2
     together = np.zeros(k)
     if variances_needed:
@@ -132,6 +141,7 @@ def _covariance(
         rows = np.stack([s.weights for s in targets.spreads])
         rows = rows - rows.mean(axis=1, keepdims=True)
         together = np.linalg.pinv(rows) @ ((np.array(variances_needed) - grand) / 2)
+        # Effects sum to 0 over the cells, and so must their covariances with the grand mean.
         together -= together.mean()
     ones = np.sqrt(k) * flat[:, 0]
     full = grand * np.outer(ones, ones) + np.outer(ones, together) + np.outer(together, ones) + effects
@@ -261,6 +271,7 @@ def make_plan(
     published = load_published(name) if name in SHIPPED else assumed(name, rated)
     people = experiment.participants if n is None else n
     widest = max(c.shape[1] for c in space.effects.values())
+    # The multivariate F of q contrasts has N - q error df.
     if people < widest + 2:
         raise InputError(f"expected at least {widest + 2} participants for {name}, got {people}")
     if people != experiment.participants:
@@ -269,6 +280,7 @@ def make_plan(
     published = with_wishes(published, space, means, effects)
     refuse_off_scale(published.means, experiment, rated)
     published, given_way = make_feasible(published, space)
+    # Published figures have a known solution, which is worth more attempts.
     as_published = people == experiment.participants and not means and not effects
     targets = make_targets(published, space, people)
     return Plan(experiment, space, published, targets, given_way, rated, as_published)
@@ -291,6 +303,7 @@ def make_plans(
 ) -> tuple[Plan, ...]:
     """A plan for every scale of a study, in order; arguments and errors are those of `make_plan`."""
     scales = scales_of(load_experiment(name))
+    # A study without scales fails in `make_plan`, with a message.
     return tuple(make_plan(name, n, means, effects, scale.name) for scale in scales) or (
         make_plan(name, n, means, effects),
     )
@@ -313,6 +326,7 @@ def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | Non
     `progress` gets (figures missed, rounds done).
     """
     rng = np.random.default_rng(_seed_of(plan, seed))
+    # One cell mean is the mean of so many ratings.
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
     steps = Steps.of(plan.scale)
     targets = steps.targets(plan.targets)
@@ -320,12 +334,14 @@ def synthesise(plan: Plan, seed: int, progress: Callable[[int, int], None] | Non
     rounds = 0
     attempts = ATTEMPTS if plan.as_published else WISHED_ATTEMPTS
     while len(repaired) < attempts and not any(not f.missed for f in repaired):
+        # The repair works on whole numbers of steps, not in units of the scale.
         start = (draw(population_of(plan, rng), targets.n, rng, exact=True) - steps.offset) / steps.size
         ends = (steps.low, steps.high)
         repaired.append(repair(start, trials, ends, targets, rng, _onward(progress, rounds)))
         rounds += repaired[-1].steps
     best = min(repaired, key=lambda f: len(f.missed))
     y = ratings_of(best.sums, trials, steps)
+    # Checked again in units of the scale, as a reader of the data would.
     reached = tuple(ReachedFigure(t.name, value_of(y, t), t.low, t.high) for t in plan.targets.everything)
     return Synthetic(
         plan.experiment,

@@ -101,6 +101,7 @@ def make_targets(published: PublishedFigures, space: DesignSpace, n: int) -> Tar
     )
     spreads = []
     for s in published.spreads:
+        # Targets are SDs; a standard error times the root of n is one.
         factor = np.sqrt(n) if s.kind == "se" else 1.0
         low, high, half = (float(v * factor) for v in narrowed(s.printed))
         spreads.append(
@@ -117,8 +118,10 @@ def test_target(test: PrintedTest, space: DesignSpace, n: int) -> TestTarget:
     effect = space.effect_called(test.effect)
     contrasts = space.effects[effect]
     q = contrasts.shape[1]
+    # Every F is allowed until p or F narrow it.
     low, high, scale = 0.0, np.inf, 1.0
     if test.p is not None:
+        # A small p is a large F: the bounds change places.
         p_low, p_high = window(test.p)
         # A little inside the bounds, so that p rounds as printed in spite of its last digits.
         low = float(stats.f.isf(min(p_high, 1.0), q, n - q)) * (1 + 1e-4)
@@ -126,6 +129,7 @@ def test_target(test: PrintedTest, space: DesignSpace, n: int) -> TestTarget:
         scale = 0.1
     if test.f is not None:
         f_low, f_high, scale = narrowed(test.f)
+        # F and p are both printed: both windows must hold.
         low, high = max(low, f_low), min(high, f_high)
     start = (low + high) / 2 if test.f is not None else None
     return TestTarget(f"F {effect}", contrasts, low, high, scale, start)
@@ -134,10 +138,12 @@ def test_target(test: PrintedTest, space: DesignSpace, n: int) -> TestTarget:
 def _pair_targets(pairs: PrintedPairs, space: DesignSpace, n: int) -> Iterator[TestTarget]:
     names = space.levels_of(pairs.factor)
     everything = list(combinations(names, 2))
+    # Bonferroni: the level is divided by the number of pairs, those named as exceptions included.
     limit = float(stats.f.isf(pairs.all_significant_below / len(everything), 1, n - 1))
     spared = {frozenset(pair) for pair in pairs.exceptions}
     for a, b in everything:
         contrast = space.weights({pairs.factor: a}) - space.weights({pairs.factor: b})
+        # 2 % away from the limit, so that no rounding puts a pair on the wrong side.
         low, high = (0.0, limit / 1.02) if frozenset((a, b)) in spared else (limit * 1.02, np.inf)
         yield TestTarget(f"pair {pairs.factor} {a} - {b}", contrast[:, None], low, high, 0.1, None)
 
@@ -146,6 +152,7 @@ def _direction_targets(direction: Direction, space: DesignSpace) -> Iterator[Mea
     for higher, lower in _ordered_places(direction, space):
         weights = space.weights(higher) - space.weights(lower)
         name = f"{place_name(higher)} above {place_name(lower)}"
+        # A difference below 0.005 would print as 0.00.
         yield MeanTarget(name, weights, 0.006, np.inf, 0.005)
 
 
@@ -154,6 +161,7 @@ def _ordered_places(
 ) -> Iterator[tuple[dict[str, str], dict[str, str]]]:
     if direction.higher is not None and direction.lower is not None:
         yield direction.higher, direction.lower
+    # Within each level of another factor, where one is named, otherwise in the margin.
     for factor, order in (direction.order or {}).items():
         outer = (
             [{direction.within: name} for name in space.levels_of(direction.within)]
@@ -164,6 +172,7 @@ def _ordered_places(
             for a, b in pairwise(order):
                 yield {**at, factor: a}, {**at, factor: b}
     if direction.highest is not None:
+        # Without `vary` the place is compared with every other combination of its factors.
         varied = [direction.vary] if direction.vary else list(direction.highest)
         for names in product(*[space.levels_of(factor) for factor in varied]):
             other = {**direction.highest, **dict(zip(varied, names, strict=True))}
@@ -187,6 +196,7 @@ class Steps:
     def of(cls, scale: RatedScale) -> "Steps":
         """The steps of a scale; without an offset where its lowest rating is a whole number of steps."""
         lowest = scale.minimum / scale.step
+        # A scale from 1 to 7 in steps of 1 counts from 0; one from 0.5 in steps of 1 cannot.
         offset = 0.0 if abs(lowest - round(lowest)) < 1e-9 else scale.minimum
         low = round((scale.minimum - offset) / scale.step)
         return cls(offset, scale.step, low, low + round((scale.maximum - scale.minimum) / scale.step))
@@ -198,6 +208,7 @@ class Steps:
 
     def targets(self, targets: Targets) -> Targets:
         """The same targets for ratings counted in steps; tests do not depend on the unit."""
+        # Most scales: nothing to convert.
         if (self.offset, self.size) == (0.0, 1.0):
             return targets
         return replace(
@@ -207,6 +218,7 @@ class Steps:
                 replace(s, low=s.low / self.size, high=s.high / self.size, scale=s.scale / self.size)
                 for s in targets.spreads
             ),
+            # Differences of means: an offset cancels.
             directions=tuple(self._mean(target, 0.0) for target in targets.directions),
         )
 
@@ -243,8 +255,10 @@ def make_feasible(
     if _possible(published.means, space):
         return published, ()
     reason = _contradiction(published.means, space)
+    # False sorts before True: the mean that is named to give way comes first.
     order = sorted(range(len(published.means)), key=lambda i: published.means[i].at != published.gives_way)
     for position in order:
+        # One last digit: a change that a misprint or a rounding can explain.
         for sign in (-1, 1):
             changed = _nudged(published.means, position, sign)
             if _possible(changed, space):
@@ -265,6 +279,7 @@ def _possible(means: tuple[PrintedMean, ...], space: DesignSpace) -> bool:
     """Whether some cell means lie strictly inside every window (linear program for the largest slack)."""
     if not means:
         return True
+    # Unknowns are the cell means and, last, the slack, which is maximized (minus 1 in the goal).
     rows = np.stack([space.weights(m.at) for m in means])
     low, high = np.array([window(m.printed) for m in means]).T
     half = (high - low)[:, None] / 2
@@ -272,6 +287,7 @@ def _possible(means: tuple[PrintedMean, ...], space: DesignSpace) -> bool:
     bounds = [(None, None)] * space.n_cells + [(None, 1.0)]
     solution = linprog(
         np.r_[np.zeros(space.n_cells), -1.0],
+        # Each mean plus and minus slack times half its window must stay inside the window.
         A_ub=np.vstack([np.hstack([rows, half]), np.hstack([-rows, half])]),
         b_ub=np.r_[high, -low],
         bounds=bounds,
@@ -283,6 +299,7 @@ def _contradiction(means: tuple[PrintedMean, ...], space: DesignSpace) -> str:
     """The two factors whose printed means put the grand mean into windows that do not meet."""
     windows = {}
     for factor in space.factors:
+        # Only a factor with all of its means printed fixes the grand mean.
         mine = {m.at[factor]: window(m.printed) for m in means if set(m.at) == {factor}}
         if len(mine) == len(space.levels_of(factor)):
             windows[factor] = tuple(float(np.mean([w[side] for w in mine.values()])) for side in (0, 1))

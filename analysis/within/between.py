@@ -83,7 +83,9 @@ class BetweenDesign:
         Left vectors (N, p), an orthonormal basis of the columns; singular values (p,); right vectors (p, p).
         """
         lengths = np.sqrt(np.einsum("ij,ij->j", self.matrix, self.matrix))
+        # At length one, as a covariate in small units would look like a dependent column.
         scaled = self.matrix / np.where(lengths > 0, lengths, 1.0)
+        # One column is its own basis: no decomposition is needed.
         if scaled.shape[1] == 1:
             return scaled, np.ones(1), np.ones((1, 1))
         left, singular, right = np.linalg.svd(scaled, full_matrices=False)
@@ -98,6 +100,7 @@ class BetweenDesign:
     def well_conditioned(self) -> bool:
         """Whether columns, scaled to length one, are so far from dependent that no digit is lost."""
         singular = self.decomposed[1]
+        # Singular values come in descending order.
         return bool(singular[-1] > WELL_CONDITIONED * singular[0])
 
     def row(self, at: dict[str, int]) -> Floats:
@@ -107,13 +110,16 @@ class BetweenDesign:
         """
         parts = {name: self._factor_row(name, at) for name in self.factors}
         for covariate in self.covariates:
+            # The mean, not the center: the two differ where another center was asked for.
             parts[covariate.name] = np.array([_standardised(covariate, covariate.values.mean())])
         return np.concatenate([_product([parts[name][None] for name in term])[0] for term in self.terms])
 
     def _factor_row(self, name: str, at: dict[str, int]) -> Floats:
         size = len(self.levels[self.factors.index(name)])
         if name not in at:
+            # Contrasts sum to 0 over the levels, so zeros are their equal-weight average.
             return np.zeros(size - 1)
+        # The first column is constant and belongs to the intercept.
         return orthonormal_basis(size)[at[name], 1:]
 
     def group_sizes(self) -> dict[tuple[str, ...], int]:
@@ -154,6 +160,7 @@ def between_design(
         A group with nobody in it, a covariate that does not vary or that the groups already determine, or
         fewer participants than coefficients and one.
     """
+    # Main effects first, then interactions, by order.
     effects = [c for order in range(1, len(factors) + 1) for c in combinations(factors, order)]
     terms: list[tuple[str, ...]] = [(), *((c.name,) for c in covariates), *effects]
     if covariate_by_group:
@@ -163,6 +170,7 @@ def between_design(
         name: orthonormal_basis(len(levels[k]))[codes[:, k], 1:] for k, name in enumerate(factors)
     }
     for covariate in covariates:
+        # Before it is standardized, which would divide by 0.
         if np.ptp(covariate.values) == 0:
             raise InputError(f"the covariate '{covariate.name}' is the same for everyone; remove it")
         parts[covariate.name] = _standardised(covariate, covariate.values)[:, None]
@@ -177,11 +185,13 @@ def between_design(
 
 
 def _standardised(covariate: Covariate, values: Floats) -> Floats:
+    # In SDs, so that the units of covariates do not matter for the condition of the matrix.
     return np.asarray((values - covariate.centre) / covariate.values.std(), dtype=np.float64)
 
 
 def _product(parts: Sequence[Floats], n: int = 1) -> Floats:
     """Products of every column of one part with every column of the others, (n, columns)."""
+    # Without parts: the intercept.
     block, *others = parts or [np.ones((n, 1))]
     for part in others:
         block = (block[:, :, None] * part[:, None, :]).reshape(len(block), -1)
@@ -198,6 +208,7 @@ def _refuse_empty_groups(factors: Sequence[str], levels: Sequence[Sequence[str]]
     empty = [at for at in product(*(range(len(group)) for group in levels)) if at not in met]
     said = "; ".join(
         " ".join(f"{name}={levels[k][code]}" for k, (name, code) in enumerate(zip(factors, at, strict=True)))
+        # Five are enough to see which groups are missing.
         for at in empty[:5]
     )
     raise InputError(
@@ -207,11 +218,13 @@ def _refuse_empty_groups(factors: Sequence[str], levels: Sequence[Sequence[str]]
 
 def _refuse_deficient(design: BetweenDesign) -> None:
     n, p = design.matrix.shape
+    # Without groups and covariates (p = 1) one participant may be read, if not tested.
     if n <= p > 1:
         raise InputError(
             f"expected more participants than coefficients between participants, got {n} for {p}; "
             "the tests have no error term"
         )
+    # Far from dependent: the slow check of each term is not needed.
     if design.well_conditioned:
         return
     # the last first: of what is determined together a covariate or its slopes are what was added
@@ -233,8 +246,10 @@ def outside(own: Floats, others: Floats) -> Floats:
     """Orthonormal rows (r, N) of what the columns `own` span outside the columns `others`."""
     basis = np.linalg.qr(others)[0] if others.shape[1] else others
     rest = own - basis @ (basis.T @ own)
+    # Twice: the first projection leaves rounding errors where columns nearly coincide.
     rest = rest - basis @ (basis.T @ rest)
     left, singular, _ = np.linalg.svd(rest, full_matrices=False)
+    # Relative to the columns themselves: what remains below it is rounding.
     return np.asarray(left.T[singular > RANK_RATIO * np.linalg.norm(own, axis=0).max()], dtype=np.float64)
 
 
@@ -262,6 +277,7 @@ def term_directions(design: BetweenDesign, sum_of_squares: int) -> list[Floats]:
 
 def _orthonormal(rows: Floats) -> Floats:
     """Orthonormal rows that span the same."""
+    # One row needs only its length; most terms have one.
     if len(rows) == 1:
         return np.asarray(rows / np.sqrt(np.vdot(rows, rows)))
     return np.linalg.qr(rows.T)[0].T
@@ -272,6 +288,7 @@ def reduced_columns(design: BetweenDesign, term: tuple[str, ...], sum_of_squares
     return [
         column
         for other, columns in zip(design.terms, design.columns, strict=True)
+        # Type II leaves out what contains the term, type III only the term.
         if other != term and (sum_of_squares == 3 or not set(term) <= set(other))
         for column in columns
     ]

@@ -24,6 +24,7 @@ from experiments.kinds import AnyAnswer
 
 # What pages measure of clips and views: bounded numbers and names.
 
+# 1e10 ms are 115 days: no session lasts longer, and a clock since 1970 is above it.
 Milliseconds = Annotated[float, Field(ge=0, le=1e10, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0, le=1_000_000)]
 FrameTime = tuple[
@@ -96,20 +97,24 @@ def validate_measured(
         return validate(data)
     except ValidationError as error:
         fault = error
+    # Copied only here, as nearly every answer is valid as it was sent.
     repaired, unknown = copy.deepcopy(data), set[Path]()
     for _ in range(MAX_PASSES):
         for detail in fault.errors(include_url=False, include_context=False, include_input=False):
             is_value = detail["type"].startswith(OF_VALUES)
             cleared = _path_cleared(repaired, detail["loc"], measured) if is_value else None
+            # One fault outside the measured values refuses the whole, whatever else could be repaired.
             if cleared is None:
                 raise fault
             _clear_values(repaired, *cleared)
             unknown.add(cleared[0])
+        # The count is a part of the data, so that it is validated and stored like any other.
         count(repaired, unknown)
         try:
             return validate(repaired)
         except ValidationError as error:
             fault = error
+    # Every pass found a repairable fault and uncovered another.
     raise fault
 
 
@@ -119,6 +124,7 @@ def _path_cleared(
     """The path in the data of the measured value with this fault, and what is to be there instead."""
     steps: list[str] = []
     here = data
+    # From the outside in: an outer measured value may hold the faulty one and is cleared as a whole.
     for step in location:
         held = _value_at_step(here, step)
         # Of a choice between models the fault names the one chosen, which is not a key of the data.
@@ -147,10 +153,12 @@ def _path_fits(path: Path, steps: Sequence[str]) -> bool:
 def _clear_values(data: Any, path: Path, unknown: Any) -> None:
     *above, last = path
     for step in above:
+        # Every step is a string, also the index of a list.
         data = data[int(step)] if isinstance(data, list) else data.setdefault(step, {})
     if unknown is LEFT_OUT:
         data.pop(last, None)
     else:
+        # A copy, since the same empty list would otherwise be shared by all places.
         data[last] = copy.deepcopy(unknown)
 
 
@@ -177,6 +185,7 @@ class Interaction(BaseModel):
     )
     moves: Count = Field(default=0, description="Pointer movements.")
 
+    # No measurement error leads to this: both are counted in the same place of the page.
     @model_validator(mode="after")
     def _trusted_are_presses(self) -> Self:
         if self.trusted > self.presses:
@@ -189,6 +198,7 @@ class Interaction(BaseModel):
 class ViewEvidence(BaseModel):
     """What a view brings along: the ticket of its play, with the batch that it is of."""
 
+    # Characters of base64url, and the dots between the parts of a sealed batch.
     batch: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9._-]{1,160}$")]
     ticket: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 
@@ -259,11 +269,13 @@ class ViewIn(BaseModel):
     play: Annotated[int, Field(ge=1, le=100)] | None = Field(
         default=None, description="The play that it is part of; an older page has one view a play."
     )
+    # Required, but may be null: a page must say that its clock cannot be right.
     started_at_client: Moment | None = Field(description="Null where the device's clock cannot be right.")
     ended_at_client: Moment | None = None
     screen: dict[Annotated[str, StringConstraints(max_length=100)], Any] = Field(
         default_factory=dict, max_length=50
     )
+    # At most one clip for each role.
     clips: Annotated[list[SeenClip], Field(max_length=6)] = []
     outcome: Outcome | None = Field(
         default=None, description="How it ended: shown to its end, or broken off by a reload or a crash."
@@ -278,6 +290,7 @@ class ViewIn(BaseModel):
 _MEASURED_OF_VIEWS: dict[Path, Any] = {
     # As a whole, by its first fault: a showing of which a part is unknown is not asked about by another page.
     ("views", ANY, "showings"): None,
+    # A log without frames, not null: the clip itself is still known.
     ("views", ANY, "clips", ANY, "drawn"): [],
     ("views", ANY, "started_at_client"): None,
     ("views", ANY, "ended_at_client"): None,
@@ -288,9 +301,11 @@ _MEASURED_OF_VIEWS: dict[Path, Any] = {
 
 
 def _count_unknown_of_views(data: Any, unknown: Set[Path]) -> None:
+    # `path[1]` is the position of the view in the request.
     for index, number in Counter(path[1] for path in unknown).items():
         view = data["views"][int(index)]
         told = view.get("disturbances")
+        # A page may have sent anything there; only a mapping can take the count.
         view["disturbances"] = {**(told if isinstance(told, dict) else {}), IMPOSSIBLE: number}
 
 
@@ -346,6 +361,7 @@ class ShownClip(BaseModel):
 class ShownClips(BaseModel):
     """The clips of a trial by their roles; those that its kind does not show are left out."""
 
+    # An unknown role would otherwise vanish without a trace.
     model_config = ConfigDict(extra="forbid")
 
     shown: ShownClip | None = None
@@ -393,12 +409,14 @@ class PlaybackLog(BaseModel):
     )
 
 
+# The answer itself is not here: a value that the participant chose is never made unknown.
 _MEASURED: dict[Path, Any] = {
     **{(name,): None for name in ("rt", "rt_from_first_frame", "time_elapsed", "answered_at_client")},
     ("changes",): LEFT_OUT,
     **{
         ("playback", name): None
         for name in PlaybackLog.model_fields
+        # Faults of the first two are the page's; disturbances are repaired key by key, below.
         if name not in ("method", "clip_sha256", "disturbances")
     },
     ("playback", "disturbances", ANY): LEFT_OUT,
@@ -413,6 +431,7 @@ _MEASURED: dict[Path, Any] = {
 
 def _count_unknown(data: Any, unknown: Set[Path]) -> None:
     playback = data.get("playback")
+    # Without a playback the answer is refused anyway, when it is validated again.
     if isinstance(playback, dict):
         told = playback.get("disturbances")
         playback["disturbances"] = {**(told if isinstance(told, dict) else {}), IMPOSSIBLE: len(unknown)}
@@ -457,8 +476,10 @@ class RefusedRecord(BaseModel):
     def which(self) -> tuple[int, int] | None:
         """The trial's index and the play, where it is an answer to one."""
         trial_index, play = self.body.get("trial_index"), self.body.get("play", 1)
+        # `type` and not `isinstance`: true and false are integers to Python.
         if not self.path.startswith(RATINGS) or type(trial_index) is not int or type(play) is not int:
             return None
+        # The bounds of `Count` and of a play above: the record was never validated.
         return (trial_index, play) if 0 <= trial_index <= 1_000_000 and 1 <= play <= 100 else None
 
 
@@ -499,6 +520,7 @@ class TrialInfo(BaseModel):
     inter_ocular_px: float | None
     clips: list[TrialClip] = Field(description="Every clip, in the order of its places.")
     prompt: str | None = Field(description="Markdown of an attention check.")
+    # The page needs the kind to know which question to show.
     check: CheckName | None = Field(
         default=None, description="What kind of motion check it is; its answer is never sent."
     )

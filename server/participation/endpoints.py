@@ -79,6 +79,7 @@ RunToken = Annotated[str, Depends(_run_token)]
 def _count(database: Database, limit: RateLimit, token: str) -> None:
     """Count one event of a link that exists: strangers' inventions would take the room of true counts."""
     with database.read() as session:
+        # Only for its refusal of an unknown link.
         links.find_link(session, token)
     limit.hit(hash_token(token))
 
@@ -95,15 +96,18 @@ async def start_run(
     services: ServicesDep, link_token: str, start: RunStart, response: Response
 ) -> RunStarted:
     """Begin a run (201), or take up the one this browser, person or personal link has (200)."""
+    # The function is async for the commit; reads of the database would block all others.
     await run_in_threadpool(_count, services.database, services.run_starts, link_token)
     if start.resume_code is not None:
         await run_in_threadpool(returning.count_code, services.resume_codes, link_token, start.resume_code)
 
     def begin(connection: Connection) -> RunStarted:
+        # `expire_on_commit` off: the commit happens outside, and the result is read after it.
         with Session(connection, expire_on_commit=False, info=services.database.carried) as session:
             started = links.start_run(
                 services.settings, services.versions, services.intake, session, link_token, start
             )
+            # The session is closed without a commit, which belongs to the group.
             session.flush()
         return started
 
@@ -115,6 +119,7 @@ async def start_run(
 @router.post("/unsupported", status_code=202)
 def report_unsupported(services: ServicesDep, report: Unsupported) -> Received:
     """Report that a browser or screen was turned away before a run began."""
+    # Before the write, so that a flood of reports costs a read at most.
     _count(services.database, services.unsupported, report.link_token)
     with services.database.write() as session:
         runs.save_unsupported(session, report)
@@ -124,9 +129,11 @@ def report_unsupported(services: ServicesDep, report: Unsupported) -> Received:
 @router.get("/run")
 def get_run(services: ServicesDep, request: Request, token: RunToken) -> RunState:
     """Everything the page needs to begin or to go on."""
+    # When the request arrived: it may have waited before its turn.
     moment = services.time_of(request)
     with services.database.read() as session:
         state = runs.run_state(services.settings, services.versions, services.intake, session, token, moment)
+    # An answer may be stored whose series could not be followed; a reload repairs that.
     if (
         any(trial.series for trial in state.trials)
         and follow(services.database, services.versions, token) is not None
@@ -197,6 +204,7 @@ def post_events(services: ServicesDep, request: Request, token: RunToken, events
 @router.post("/run/complete")
 def complete_run(services: ServicesDep, token: RunToken) -> Completion:
     """Close the run and get the code; refused while trials or required questions are unanswered."""
+    # Reads clips, so it comes before the write and its locks.
     judge_waiting(services.database, services.intake, token)
     with services.database.write() as session:
         return runs.complete_run(services.versions, session, token)
@@ -233,6 +241,7 @@ async def post_views(services: ServicesDep, request: Request, token: RunToken, b
             services.versions, services.intake, connection, token, body, received_at
         )
 
+    # Committed with other requests: one sync of the disk serves all of them.
     return json_response(await services.group_commit.run(token, save))
 
 
@@ -253,7 +262,9 @@ async def put_rating(
         return rating_service.save_rating(*work, received_at)
 
     receipt, is_new = await services.group_commit.run(token, save)
+    # Nearly every receipt has no warning; null would be sent with every answer.
     left_out: dict[str, Any] = {} if receipt.warning else {"receipt": {"warning"}}
+    # After the commit: the choice of the next clips must not delay or endanger the answer.
     if rating.answer.kind in KINDS and KINDS[rating.answer.kind].adapts:
         receipt, following = await run_in_threadpool(
             next_trials, services.database, services.versions, token, receipt
@@ -294,6 +305,7 @@ async def _stored_after_all(
     received_at: datetime,
 ) -> dict[str, Any] | None:
     """None where the record is an answer that can be stored, and now is; else why it cannot."""
+    # Other records (events, views) are not tried again: their loss costs no answer.
     if not record.path.startswith(RATINGS):
         return {}
     try:
@@ -310,6 +322,7 @@ async def _stored_after_all(
     except RatingDiffers:
         return None
     except ApiError as refusal:
+        # These say that the sender has no right to write: then the refused record is not kept, either.
         if isinstance(refusal, (RunUnknown, RunClosed, *EVIDENCE_REFUSALS)):
             raise
         return {"status": refusal.status, "code": refusal.code, "message": str(refusal)}

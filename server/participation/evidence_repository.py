@@ -38,9 +38,11 @@ ANSWER = RefusalEvents("answer_refused", "answer_expired")
 VIEW = RefusalEvents("view_refused", "view_expired")
 
 _evidence = cast(Table, AnswerEvidence.__table__)
+# `inline`: the number of the new row is not needed, so it is not asked for.
 _INSERT = Prepared(insert(_evidence).inline(), _evidence.c.keys())
 
 _views = cast(Table, View.__table__)
+# One pass over the views gives both sums.
 _as_young = case((_views.c.issued_at >= bindparam("since"), _views.c.clip_ms), else_=0.0)
 
 
@@ -53,7 +55,9 @@ class ViewTime(NamedTuple):
 
 
 _SPENT_BY_VIEWS = Query(
+    # Views without a ticket have no moment of issue.
     select(
+        # A sum over no rows is null.
         func.coalesce(func.sum(_views.c.clip_ms), 0.0),
         func.coalesce(func.sum(_as_young), 0.0),
         func.min(_views.c.issued_at),
@@ -85,6 +89,7 @@ def clip_ms_since(connection: Connection, run: int, issued_at: datetime) -> floa
 
 def answers_without_digest(connection: Connection, run: int) -> int:
     """How many answers of a run to trials with clips have no digest of them."""
+    # Clip time above 0: a trial without clips has nothing to take a digest of.
     is_without = AnswerEvidence.digest.is_(None) & (AnswerEvidence.clip_ms > 0)
     query = select(func.count()).where((AnswerEvidence.study_run_id == run) & is_without)
     return int(connection.scalar(query) or 0)
@@ -97,6 +102,7 @@ def add_evidence(connection: Connection, values: dict[str, Any]) -> None:
 
 def note_refusal(connection: Connection, run: int, event: str, code: str, moment: datetime) -> None:
     """Note that an answer was refused for this reason: once a run and reason, however many come."""
+    # The same number for the same reason, so that it is stored once; the column has 40 characters.
     event_id = f"{event} {code}"[:40]
     values = {"event_id": event_id, "study_run_id": run, "type": event, "received_at": moment}
     insert_once(Session(connection), RunEvent, [values | {"data": {"code": code}}])
@@ -131,6 +137,7 @@ def answers(session: Session, run: StudyRun) -> list[StoredAnswer]:
     rated = (Rating.trial_index, Rating.play, Rating.kind, Rating.payload, Rating.rt, Rating.verdict)
     query = select(*rated, Rating.saved_at).where(Rating.study_run_id == run.id).order_by(Rating.id)
     trials, shown, evidence = _trials(session, run), _with_clips(session, run), _stored_evidence(session, run)
+    # Most studies have no motion checks, which saves a query.
     checks = _checks(session, run) if any(trial.kind == "check" for trial in trials.values()) else {}
     return [
         StoredAnswer(
@@ -167,6 +174,7 @@ def checks_passed_over(session: Session, run: StudyRun) -> list[CheckName]:
     """Kinds of the motion checks without an answer that come before a trial with one."""
     rated = select(Rating.trial_index).where(Rating.study_run_id == run.id)
     last = select(func.max(Rating.trial_index)).where(Rating.study_run_id == run.id).scalar_subquery()
+    # Order is by index: a check that comes after the last answer may still be answered.
     query = (
         select(VersionClip.levels)
         .join(TrialClip, VersionClip.id == TrialClip.version_clip_id)
@@ -228,14 +236,17 @@ _UNCHECKED = (
     .select_from(
         _runs.join(_evidence, _evidence.c.study_run_id == _runs.c.id)
         .join(_trial_clips, _same_trial(_trial_clips, _evidence))
+        # Outer: only trials of adaptive series have rows there.
         .outerjoin(
             _in_series, _same_trial(_in_series, _trial_clips) & (_in_series.c.role == _trial_clips.c.role)
         )
         .outerjoin(_chosen, _same_trial(_chosen, _evidence) & (_chosen.c.play == _evidence.c.play))
+        # The clip that was shown, or, outside a series, the assigned one.
         .join(_placed, _placed.c.id == func.coalesce(_shown, _trial_clips.c.version_clip_id))
         .join(_clips, _clips.c.sha256 == _placed.c.clip_sha256)
     )
     .where(*_unchecked)
+    # A digest is over the clips in the order of their places.
     .order_by(_evidence.c.trial_index, _evidence.c.play, _trial_clips.c.position)
 )
 _WAITING = Query(
@@ -248,6 +259,7 @@ _JUDGE = Prepared(
     .where(
         _evidence.c.study_run_id == bindparam("run"),
         _evidence.c.trial_index == bindparam("trial"),
+        # Other names than those of columns, which SQLAlchemy keeps for the values of an update.
         _evidence.c.play == bindparam("of_play"),
         # Only where nothing was said yet: of two workers that judge at once, the first counts.
         _evidence.c.digest_right.is_(None),
@@ -274,6 +286,7 @@ def unchecked_runs(session: Session) -> list[int]:
 
 def lock_run(session: Session, run: int) -> StudyRun:
     """The run with this number as it is stored; locked (PostgreSQL)."""
+    # Read again: what the session holds may be older than the lock.
     return session.get_one(StudyRun, run, with_for_update=True, populate_existing=True)
 
 
@@ -287,4 +300,5 @@ def note_digests(session: Session, run: StudyRun, said: dict[str, Any], moment: 
 def judge_digest(connection: Connection, run: int, trial_index: int, play: int, *, right: bool) -> bool:
     """Note whether the digest of an answer is right; False where that was said before."""
     values = {"run": run, "trial": trial_index, "of_play": play, "right": right}
+    # No row changed means that another worker was first.
     return _JUDGE.count(connection, values) == 1

@@ -52,6 +52,7 @@ class StoredRating(NamedTuple):
 _RUN = Query(
     select(*(_runs.c[name] for name in RunForRating._fields))
     .where(_runs.c.token_hash == bindparam("token_hash"))
+    # SQLite ignores it: there one writer at a time has the whole database.
     .with_for_update(),
     RunForRating._make,
 )
@@ -63,6 +64,7 @@ _TRIAL = Query[tuple[Any, ...]](
         *(_tallies.c[name] for name in COLUMNS),
     )
     .select_from(
+        # Outer: a trial may have no clips, and a run no tally before its first answer.
         _trials.outerjoin(_clips).outerjoin(_tallies, _tallies.c.study_run_id == _trials.c.study_run_id)
     )
     .where(_trials.c.study_run_id == bindparam("run"), _trials.c.trial_index == bindparam("trial_index"))
@@ -73,6 +75,7 @@ _TRIAL = Query[tuple[Any, ...]](
 _STORED = Query(
     select(*(_ratings.c[name] for name in StoredRating._fields)).where(
         _ratings.c.study_run_id == bindparam("run"),
+        # By the id as well: the same id with another trial is a mistake to report.
         or_(
             _ratings.c.trial_index == bindparam("trial_index"),
             _ratings.c.rating_id == bindparam("rating_id"),
@@ -80,6 +83,7 @@ _STORED = Query(
     ),
     StoredRating._make,
 )
+# The database numbers the row.
 _INSERT = Prepared(insert(_ratings).inline(), [column.name for column in _ratings.c if column.name != "id"])
 _CHECKS = (
     select(_ratings.c.payload, _trials.c.expected_response)
@@ -90,6 +94,7 @@ _LATEST = (
     select(_ratings.c.payload, _ratings.c.rt, _ratings.c.saved_at)
     .select_from(_ratings.join(_trials))
     .where(_ratings.c.study_run_id == bindparam("run"), _trials.c.kind == "main")
+    # By number, as moments of two answers may be equal.
     .order_by(_ratings.c.id.desc())
 )
 REFUSED = "record_refused"
@@ -117,6 +122,7 @@ _SEEN = Prepared(
     .values(
         last_seen_at=bindparam("seen"),
         elapsed_ms=bindparam("elapsed"),
+        # Added in the database, so that no older count is written back.
         trials_answered=_runs.c.trials_answered + bindparam("answered"),
     )
 )
@@ -143,8 +149,10 @@ def trial(connection: Connection, run: int, trial_index: int) -> StoredTrial | N
     rows = _TRIAL.all(connection, {"run": run, "trial_index": trial_index})
     if not rows:
         return None
+    # Every row repeats the kind and the tally; only the clips differ.
     kind, counted = rows[0][0], rows[0][3:]
     clips = {role: clip for _, role, clip, *_ in rows if role is not None}
+    # All columns of a tally are null together, where the outer join found none.
     tally = None if counted[0] is None else tally_of(*counted)
     return StoredTrial(kind, clips, tally)
 
@@ -214,6 +222,7 @@ def refused_records(connection: Connection, run: int) -> list[dict[str, Any]]:
 def refused_trials(connection: Connection, run: int) -> set[int]:
     """Trials of a run whose answer was refused for good: nothing more is asked of them."""
     indices = (data.get("trial_index") for data in refused_records(connection, run))
+    # A refused record may be of something else than a trial, or hold anything.
     return {index for index in indices if isinstance(index, int)}
 
 
@@ -223,6 +232,7 @@ def refused_checks(connection: Connection, run: int) -> int:
     if not refused:
         return 0
     stored = set(connection.scalars(select(Rating.trial_index).where(Rating.study_run_id == run)))
+    # An answer stored at another attempt outweighs the refused one.
     return len(refused & set(connection.scalars(_CHECK_INDICES, {"run": run})) - stored)
 
 

@@ -27,12 +27,15 @@ Stage = Literal[
     "debrief",
     "done",
 ]
+# A literal type must be written out and cannot be made from the tuple.
 if Stage.__args__ != STAGES:  # type: ignore[attr-defined]
     raise RuntimeError("the stages of the API and of the database differ")
 
 Origin = Literal["participant", "preview", "pilot", "simulated"]
+# Bounds keep a stranger from filling the database by a single request.
 Text = Annotated[str, StringConstraints(max_length=500)]
 Key = Annotated[str, StringConstraints(max_length=100)]
+# A language, with a region where two of them differ (pt-BR).
 LanguageTag = Annotated[str, StringConstraints(pattern=r"^[a-z]{2}(-[A-Z]{2})?$")]
 
 
@@ -81,6 +84,7 @@ class RunStart(BaseModel):
     client_id: UUID
     evidence: bool = Field(default=False, description="The page brings evidence with each answer.")
     view_tickets: bool = Field(default=False, description="It brings a ticket with each view, too.")
+    # Stored as it comes: a recruiter's names of parameters are not known in advance.
     query: dict[Key, Text] = Field(
         default_factory=dict, max_length=20, description="Parameters of the address, such as PROLIFIC_PID."
     )
@@ -168,6 +172,7 @@ class RunState(BaseModel):
     languages: list[str]
     texts: Texts = Field(description="Markdown of the run's language, by page.")
     forms: tuple[Form, ...]
+    # By kind: each kind of trial declares what its page needs.
     trial: AnyPage
     display: Display
     playback: PlaybackRules
@@ -181,6 +186,7 @@ class RunState(BaseModel):
     checks: ShownChecks | None = Field(
         default=None, description="Words of the motion checks; null where there are none."
     )
+    # The clock of the page starts again after a reload; this is added to it.
     elapsed_ms_before: float
     completion_code: str | None
     resumable_until: datetime | None = Field(
@@ -190,6 +196,7 @@ class RunState(BaseModel):
         description="By it the visit is taken up on another device; null where the link itself does that."
     )
     server_time: datetime
+    # Null for pages that do not bring evidence, and after the end of a run.
     tickets: Tickets | None = Field(description="Leave to answer, a ticket for each play of each trial.")
     warning: WarningShown | None = Field(default=None, description="One that no page has shown yet.")
 
@@ -223,6 +230,7 @@ class Received(BaseModel):
 # What the participant's page sends once a run has begun, or where none may begin.
 
 EventType = Annotated[str, StringConstraints(pattern=r"^[a-z_]{1,30}$")]
+# JSON has no infinity, but its parsers accept it.
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Percent = Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)]
 Millimetres = Annotated[float, Field(ge=0, le=10_000, allow_inf_nan=False)]
@@ -241,6 +249,7 @@ class CalibrationResult(BaseModel):
     What has a default was not sent by the pages of before.
     """
 
+    # 200 px per mm is about 5000 dpi, ten times the finest phone.
     px_per_mm: Annotated[float, Field(gt=0, le=200, allow_inf_nan=False)]
     method: Literal["card", "ruler"]
     viewing_distance_mm: Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False)] | None = None
@@ -287,6 +296,7 @@ class LanguageChange(BaseModel):
 class FormAnswers(BaseModel):
     """Answers by field name."""
 
+    # Values are checked by the declaration of the form, which a schema cannot know.
     answers: dict[Key, Any] = Field(max_length=200)
 
 
@@ -295,6 +305,7 @@ class Event(BaseModel):
 
     id: UUID
     type: EventType
+    # A clock of the participant may be wrong, so the server adds its own time of arrival.
     at: datetime | None = None
     data: dict[Key, Any] = Field(default_factory=dict, max_length=50)
 
@@ -302,12 +313,14 @@ class Event(BaseModel):
 class Events(BaseModel):
     """Up to 100 events; those the server already has are left as they are."""
 
+    # A page that was offline sends its backlog in several requests.
     events: list[Event] = Field(max_length=100)
 
 
 class Unsupported(BaseModel):
     """A browser or screen that failed a gate before a run began."""
 
+    # There is no run yet, and so no run token.
     link_token: Annotated[str, StringConstraints(max_length=100)]
     reason: Key
     data: dict[Key, Any] = Field(default_factory=dict, max_length=50)

@@ -71,6 +71,7 @@ def checked_answers(form: Form, answers: Mapping[str, Any]) -> dict[str, Any]:
             problems[field.name] = problem
         elif not is_empty(value):
             kept[field.name] = value
+    # The message names one field; the page marks all of them from `fields`.
     if problems:
         name, problem = next(iter(problems.items()))
         raise FormInvalid(f"Form {form.name}, field {name}: {problem}.", fields=problems)
@@ -89,12 +90,15 @@ def complete_run(versions: Versions, session: Session, token: str) -> Completion
     if run.status == "active":
         _need_everything(session, run, loaded)
         run.status, run.stage, run.completed_at = "complete", "debrief", now()
+        # One moment for both: the two columns then agree exactly.
         run.last_seen_at = run.completed_at
         run.evidence_verdict = judge_run(session, run).verdict
         _close_when_full(session, study, run)
     if run.status == "screened_out":
+        # Screening may have ended the run before anything was judged.
         run.evidence_verdict = run.evidence_verdict or judge_run(session, run).verdict
         return _screened_out(session, run, loaded.experiment)
+    # Withdrawn: the code is for participation to the end.
     if run.status != "complete":
         raise RunClosed(f"This visit is over ({run.status}) and has no completion code.")
     code = completion_code(session, run, loaded)
@@ -104,6 +108,7 @@ def complete_run(versions: Versions, session: Session, token: str) -> Completion
 
 
 def _need_everything(session: Session, run: StudyRun, loaded: LoadedVersion) -> None:
+    # The list knows which trials an adaptive series no longer needs; a plain count does not.
     trials = [trial.trial_index for trial in trial_list(session, run, loaded) if not trial.answered]
     if trials:
         message = f"{len(trials)} of {run.trials_total} trials are still to be answered."
@@ -144,8 +149,10 @@ def _screened_out(session: Session, run: StudyRun, experiment: Experiment) -> Co
 
 
 def _close_when_full(session: Session, study: Study | None, run: StudyRun) -> None:
+    # Previews and simulated runs never fill the quota of a study.
     if study is None or study.quota is None or run.origin not in ("participant", "pilot"):
         return
+    # The count below is a query: this run's completion must be in the database first.
     session.flush()
     if run_repository.complete_runs(session, study, run.origin) >= study.quota:
         study.status, study.closed_at = "closed", now()
@@ -200,6 +207,7 @@ def state_of(
         trials=trials,
         checks=shown_checks(experiment, run.language),
         elapsed_ms_before=run.elapsed_ms,
+        # The code is a secret of complete runs: an open page must not hold it.
         completion_code=completion_code(session, run, loaded) if run.status == "complete" else None,
         resumable_until=resumable_until(experiment, run),
         resume_code=shown_code(
@@ -207,15 +215,18 @@ def state_of(
         ),
         server_time=moment,
         tickets=_tickets(intake, run, loaded, moment),
+        # After the end a warning has no trial to be shown before.
         warning=waiting_warning(session.connection(), run.id, experiment) if run.status == "active" else None,
     )
 
 
 def _tickets(intake: Intake, run: StudyRun, loaded: LoadedVersion, moment: datetime) -> Tickets | None:
+    # Older pages start without asking for evidence, and closed runs answer nothing.
     if run.evidence != "asked" or run.status != "active":
         return None
     batch = issue(intake.key, run.public_id, moment)
     intake.clips.prepare(run.version_id, [(clip.sha256, clip.bytes) for clip in loaded.clips.values()])
+    # A failed play may be repeated so often, and every play needs its ticket.
     plays = [1 + loaded.experiment.playback.max_repeats] * run.trials_total
     return Tickets(batch=batch.text, by_trial=tickets(intake.key, batch, plays))
 
@@ -230,6 +241,7 @@ def save_consent(versions: Versions, session: Session, token: str, agreed: bool)
     run = open_run(session, token)
     if not agreed:
         run.status = "withdrawn"
+    # Sending consent again keeps the first moment.
     elif run.consented_at is None:
         experiment = versions.get(session, run.version_id).experiment
         before = any(form.when == "before" for form in experiment.forms)
@@ -244,6 +256,7 @@ def save_calibration(session: Session, token: str, result: CalibrationResult) ->
     run = open_run(session, token)
     current_run.check_calibrations(run_repository.calibrations(session, run))
     session.add(Calibration(study_run_id=run.id, **result.model_dump()))
+    # Copied to the run: ratings take it from there.
     run.px_per_mm, run.viewing_distance_mm = result.px_per_mm, result.viewing_distance_mm
     return saved_response(run)
 
@@ -251,6 +264,7 @@ def save_calibration(session: Session, token: str, result: CalibrationResult) ->
 def save_device(session: Session, token: str, device: dict[str, Any]) -> Saved:
     """Add what the page found out about browser and screen to what is known."""
     run = open_run(session, token)
+    # Later findings win; earlier ones that are not sent again stay.
     run.device = current_run.checked_device({**run.device, **device})
     return saved_response(run)
 
@@ -272,6 +286,7 @@ def save_stage(session: Session, token: str, stage: Stage) -> Saved:
     run = find_run(session, token, lock=True)
     if stage not in BEFORE_CONSENT and run.status == "active":
         need_consent(run)
+    # Pages after completion (debrief, done) still report where they are.
     if run.status in ("active", "complete"):
         run.stage, run.last_seen_at = stage, now()
     return saved_response(run)
@@ -297,6 +312,7 @@ def save_events(session: Session, token: str, events: list[Event], moment: datet
     """Store events, each once; also after the run's end."""
     run = find_run(session, token, lock=True)
     run.last_seen_at = moment
+    # Before anything is added: events come in batches, and a batch is stored whole or not.
     current_run.check_event_types(event.type for event in events)
     current_run.check_events([event.data for event in events], run_repository.events(session, run))
     rows = [
@@ -315,11 +331,13 @@ def save_events(session: Session, token: str, events: list[Event], moment: datet
 
 
 def _with_zone(event: Event) -> Any:
+    # A clock without a zone is taken as UTC, since the column has zones.
     return event.at if event.at is None or event.at.tzinfo else event.at.replace(tzinfo=now().tzinfo)
 
 
 def save_unsupported(session: Session, report: Unsupported) -> None:
     """Store why a browser was turned away before a run began."""
+    # There is no run yet, so the event belongs to the link.
     link = find_link(session, report.link_token)
     data = current_run.checked_data({"reason": report.reason, **report.data})
     session.add(RunEvent(event_id=new_public_id(), link_id=link.id, type="unsupported", data=data))
@@ -328,6 +346,7 @@ def save_unsupported(session: Session, report: Unsupported) -> None:
 def withdraw(session: Session, token: str) -> Saved:
     """End the run at the participant's wish; what was stored is kept and marked."""
     run = find_run(session, token, lock=True)
+    # A run that has ended keeps the status it ended with.
     if run.status == "active":
         run.status, run.last_seen_at = "withdrawn", now()
         run.evidence_verdict = judge_run(session, run).verdict
@@ -348,6 +367,7 @@ def save_form(
     moment: datetime,
 ) -> Saved:
     """Store a form's answers once they fit the declaration; sending it again replaces them."""
+    # Read without a lock, which is taken below in the order study, run.
     loaded = versions.get(session, find_run(session, token).version_id)
     asked = deciding_question(loaded.experiment)
     decides = asked is not None and asked.form == name
@@ -357,14 +377,17 @@ def save_form(
     run = open_run(session, token)
     need_consent(run)
     checked = _checked_answers(loaded, name, answers)
+    # The trials of the run are already chosen from the first answer.
     if asked is not None and decides and run.slot != NO_SLOT:
         _refuse_another_group(loaded, run, asked.field, checked)
     _store(session, run, name, checked)
     current_run.by_form(session, run, loaded.experiment, name, checked)
+    # `by_form` may just have screened the run out.
     if asked is not None and decides and run.status == "active" and run.slot == NO_SLOT:
         _assign_slot_of(session, run, loaded, group_of_answer(loaded.experiment, checked[asked.field]))
     if not decides or run.status != "active":
         return saved_response(run)
+    # The state below is read by queries, which must see the new slot.
     session.flush()
     return saved_response(run).model_copy(
         update={"run": state_of(settings, versions, intake, session, run, moment)}

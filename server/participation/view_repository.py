@@ -57,6 +57,7 @@ _RUN = Query(
 )
 _OF_TRIAL = Query(
     select(_views.c.view_id, _trials.c.trial_index, _views.c.number, _views.c.completed)
+    # Outer: a trial without views is known from one that does not exist.
     .select_from(_trials.outerjoin(_views))
     .where(_trials.c.study_run_id == bindparam("run"), _trials.c.trial_index == bindparam("trial")),
     StoredView._make,
@@ -93,11 +94,13 @@ _COMPLETE = Prepared(
     .where(_views.c.study_run_id == bindparam("run"), _views.c.view_id == bindparam("view"))
     .values(completed=true(), **{name: bindparam(name) for name in _ENDED})
 )
+# From a select: the number of the view is looked up in the same statement.
 _ADD_CLIP = Prepared(
     insert(_view_clips).from_select(
         ["view", "role", "clip_sha256", "frame_log"],
         select(
             _views.c.id,
+            # Types are named, as a select of bare parameters has none for PostgreSQL.
             bindparam("role", type_=String),
             bindparam("sha256", type_=String),
             bindparam("log", type_=Text),
@@ -124,6 +127,7 @@ def stored_views(connection: Connection, run: int, trial: int) -> list[StoredVie
 def clips_of_trial(connection: Connection, run: int, trial: int) -> TrialClips:
     """A trial's clips, and whether it is a motion check."""
     rows = _CLIPS_OF_TRIAL.all(connection, {"run": run, "trial": trial})
+    # Every row repeats the kind of the trial.
     return TrialClips({role: ident for role, ident, _ in rows}, any(kind == "check" for _, _, kind in rows))
 
 
@@ -161,6 +165,7 @@ def numbers(session: Session, run: StudyRun) -> dict[int, int]:
 
 def unanswered_views(session: Session, run: StudyRun) -> Sequence[View]:
     """Views of plays that have no answer, in the order of their trials and numbers."""
+    # A play, not a trial: an answer to play 1 leaves the views of play 2 waiting.
     answered = select(Rating.id).where(
         Rating.study_run_id == View.study_run_id,
         Rating.trial_index == View.trial_index,
@@ -173,6 +178,7 @@ def unanswered_views(session: Session, run: StudyRun) -> Sequence[View]:
 def clips_of(session: Session, views: Iterable[View]) -> dict[int, list[ViewClip]]:
     """The clips of each of these views."""
     by_view: dict[int, list[ViewClip]] = {}
+    # One query for all views.
     for clip in session.scalars(select(ViewClip).where(ViewClip.view.in_([view.id for view in views]))):
         by_view.setdefault(clip.view, []).append(clip)
     return by_view

@@ -35,8 +35,10 @@ def find_run(session: Session, study: Study, public_id: str, *, lock: bool = Fal
     """The run of a study by its public identifier, held where `lock`; previews are not runs of people."""
     query = select(StudyRun).where(StudyRun.study_id == study.id, StudyRun.public_id == public_id)
     query = query.where(StudyRun.origin != "preview")
+    # Only the run itself is locked, not rows that are loaded with it.
     run = session.scalar(query.with_for_update(of=StudyRun) if lock else query)
     if run is None:
+        # Shortened: the id comes from the address and may be of any length.
         raise NotFound(f"There is no run '{public_id[:40]}' in the study '{study.name}'.")
     return run
 
@@ -55,6 +57,7 @@ def _shown_runs(
     session: Session, study: Study, show: Show, search: str, *, simulated: bool
 ) -> Select[StudyRun]:
     """The runs of a study but previews that are to be shown; those of simulated people where asked for."""
+    # The choice "simulated" would otherwise show an empty list.
     left_out = ("preview",) if simulated or show == "simulated" else ("preview", "simulated")
     query = select(StudyRun).where(
         StudyRun.study_id == study.id, StudyRun.origin.not_in(left_out), *_SHOWN[show]
@@ -70,6 +73,7 @@ def _search_condition(session: Session, search: str) -> ColumnElement[bool]:
     """
     folds = session.get_bind().dialect.name == "sqlite" and search.isascii()
     contains = StudyRun.participant.contains if folds else StudyRun.participant.icontains
+    # `autoescape`: % and _ in the text are searched for as they are.
     in_id = StudyRun.public_id.contains(search.lower(), autoescape=True)
     return contains(search, autoescape=True) | in_id
 
@@ -93,6 +97,7 @@ def page_of_runs(
     """At most `limit` runs, the latest first, those begun before the run with the number `before`."""
     query = _shown_runs(session, study, show, search, simulated=simulated)
     query = query.order_by(StudyRun.id.desc()).limit(limit)
+    # Both are shown in every row; loading them one by one would take a query for each run.
     query = query.options(
         joinedload(StudyRun.link), joinedload(StudyRun.version).load_only(StudyVersion.number)
     )
@@ -104,6 +109,7 @@ def answered_trials(session: Session, runs: Sequence[int]) -> dict[int, tuple[se
     """Run number -> (trials answered, plays that were flagged or failed); for one page of runs."""
     query = select(RunTally.study_run_id, RunTally.heat, RunTally.not_good)
     rows = session.execute(query.where(RunTally.study_run_id.in_(runs)))
+    # The heat has a character for each trial, a dot where there is no answer.
     return {
         run: ({trial for trial, letter in enumerate(heat) if letter != "."}, not_good)
         for run, heat, not_good in rows
@@ -132,6 +138,7 @@ def plays(session: Session, run: StudyRun) -> list[tuple[Rating, AssignedTrial, 
             TrialClip,
             (TrialClip.study_run_id == Rating.study_run_id)
             & (TrialClip.trial_index == Rating.trial_index)
+            # The first clip names the trial in lists; trials of several clips would give several rows.
             & (TrialClip.position == 0),
         )
         .outerjoin(VersionClip, VersionClip.id == TrialClip.version_clip_id)
@@ -143,6 +150,7 @@ def plays(session: Session, run: StudyRun) -> list[tuple[Rating, AssignedTrial, 
 
 def events(session: Session, run: StudyRun) -> list[RunEvent]:
     """The events of a run in the order they came, heartbeats left out."""
+    # Heartbeats come every 20 s and say only that the page was open.
     query = select(RunEvent).where(RunEvent.study_run_id == run.id, RunEvent.type != "heartbeat")
     return list(session.scalars(query.order_by(RunEvent.id)))
 
@@ -165,6 +173,7 @@ def every_visit(session: Session, runs: Sequence[StudyRun], *, lock: bool = Fals
     these in turn. Previews are nobody's.
     """
     known, news = {run.id: run for run in runs}, list(runs)
+    # In turn: a run found by its link may have another recruiter's id, and so on.
     while news:
         further = [other for run in news for other in _of_same_person(session, run, lock=lock)]
         news = list({other.id: other for other in further if other.id not in known}.values())
@@ -175,11 +184,13 @@ def every_visit(session: Session, runs: Sequence[StudyRun], *, lock: bool = Fals
 
 
 def _of_same_person(session: Session, run: StudyRun, *, lock: bool) -> list[StudyRun]:
+    # A general link is shared by many people and identifies nobody.
     same: ColumnElement[bool] = StudyRun.link_id == run.link_id if run.link.kind == "personal" else false()
     hashed = identities.same_person(session, run)
     if hashed is not None:
         same |= hashed
     query = select(StudyRun).where(StudyRun.study_id == run.study_id, same, StudyRun.origin != "preview")
+    # In one order, so that two requests that lock the same visits do not wait for each other.
     query = query.where(StudyRun.erased_at.is_(None)).order_by(StudyRun.id)
     return list(session.scalars(query.with_for_update(of=StudyRun) if lock else query))
 
@@ -203,6 +214,7 @@ def delete_personal_rows(session: Session, run: StudyRun) -> int:
     personal = (AnswerEvidence, View, RunEvent, FormAnswer, Calibration)
     # Which clips were shown follows from the group, and in a series from the answers.
     shown = (SeriesAnswer, SeriesOffer, SeriesTrial, TrialClip)
+    # The row of the run stays; `server.privacy.erasures` empties what identifies the person.
     for table in (Rating, RunTally, *personal, *shown):
         session.execute(delete(table).where(table.study_run_id == run.id))
     session.execute(delete(RunEvent).where(of_personal_link(run)))

@@ -49,9 +49,11 @@ def report_text(
     doubts : sequence of str
         Lines about the recording's quality in addition to those that are counted here.
     """
+    # Rejected blinks are marked in the figure, but count nowhere.
     accepted = frame[frame["accepted"]]
     environment = Environment(
         loader=PackageLoader("stimuli_builder.blinks", "templates"),
+        # Names of files and columns are text of others and may hold HTML.
         autoescape=True,
         undefined=StrictUndefined,
     )
@@ -77,6 +79,7 @@ def blink_rows(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame, scale: Scale |
     """Lines of the table of blinks, a value an eye; medians with the quartiles."""
     parts = [accepted[accepted["column"] == eye.series.column] for eye in eyes]
     rates = tuple(f"{len(part) / eye.seconds * 60:.1f}" for part, eye in zip(parts, eyes, strict=True))
+    # From minimum to minimum, in the order of time.
     pauses = [pd.Series(np.diff(np.sort(part["minimum_s"]))) for part in parts]
     return [
         Row("blinks", tuple(str(len(part)) for part in parts)),
@@ -91,6 +94,7 @@ def blink_rows(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame, scale: Scale |
 
 def _phase_rows(parts: Sequence[pd.DataFrame]) -> list[Row]:
     """How long blinks and their phases last, and how far lids close."""
+    # The table has both moments in s, but durations in ms.
     closed = [(part["closed_to_s"] - part["closed_from_s"]) * 1000 for part in parts]
     return [
         _spread_row("duration, ms", parts, "duration_ms"),
@@ -103,6 +107,7 @@ def _phase_rows(parts: Sequence[pd.DataFrame]) -> list[Row]:
 
 def _speed_rows(parts: Sequence[pd.DataFrame], scale: Scale | None, *, is_px: bool) -> list[Row]:
     """Amplitudes and speeds, in mm where there is a scale."""
+    # Columns of other programs may be ratios, whose unit nobody knows.
     unit, factor = ("px" if is_px else "units", 1.0) if scale is None else ("mm", scale.mm_per_px)
     return [
         _spread_row(f"amplitude, {unit}", parts, "amplitude", 2, factor),
@@ -127,8 +132,10 @@ def _complete(part: pd.DataFrame) -> str:
 
 def _quartiles(values: "pd.Series[float]", digits: int = 0) -> str:
     known = values.dropna()
+    # No blinks, or none with this measure.
     if known.empty:
         return "-"
+    # Quartiles: durations of blinks are skewed.
     low, middle, high = np.percentile(known, [25, 50, 75])
     return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
 
@@ -136,16 +143,20 @@ def _quartiles(values: "pd.Series[float]", digits: int = 0) -> str:
 def _main_sequence(part: pd.DataFrame) -> str:
     """Slope through the origin of peak closing speed on amplitude, and their correlation."""
     amplitude, speed = part["amplitude"].to_numpy(), part["peak_closing_velocity"].to_numpy()
+    # A line through fewer points, or through equal amplitudes, has no meaning.
     if len(part) < 3 or float(np.ptp(amplitude)) == 0:
         return "-"
+    # Through the origin: a blink of no amplitude has no speed.
     slope = float(amplitude @ speed / (amplitude @ amplitude))
     return f"{slope:.1f} (r = {np.corrcoef(amplitude, speed)[0, 1]:.2f})"
 
 
 def _closure_ratio(eye: EyeBlinks) -> str:
+    # Without a blink it is not known where the closed eye is.
     if not eye.blinks:
         return "-"
     closure = closure_course(eye.series, eye.blinks[0].closed_distance)
+    # Frames without a value count neither as open nor as closed.
     known: Array = closure[np.isfinite(closure)]
     return f"{(known >= NEARLY_CLOSED).mean():.1%}"
 
@@ -178,8 +189,10 @@ def pair_lines(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame) -> list[str]:
             "the column names do not identify left and right (such as EAR_left, EAR_right): blinks are not "
             "paired"
         ]
+    # In the order of the table; `pair` has the left eye first.
     columns = [columns[k] for k in sorted(pair)]
     pairs = accepted.dropna(subset=["partner"])
+    # A pair is in both rows; the first eye alone counts each pair once.
     first = pairs[pairs["column"] == columns[0]]
     alone = [int((accepted["column"] == c).sum() - (pairs["column"] == c).sum()) for c in columns]
     lines = [
@@ -197,6 +210,8 @@ def pair_lines(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame) -> list[str]:
 def _svg(figure: "Figure") -> str:
     """A figure as an SVG element, without the XML head and the clock."""
     stream = io.StringIO()
+    # Without a date, so that the same recording gives the same bytes.
     figure.savefig(stream, format="svg", metadata={"Date": None})
     text = stream.getvalue()
+    # An SVG inside a page has no XML declaration.
     return text[text.index("<svg") :]

@@ -51,6 +51,7 @@ def words_of(column: str) -> list[str]:
 
 def eye_of(column: str) -> Eye | None:
     """The eye named by the words of a column's name: l, left, r, right; else None."""
+    # The r of AU45_r would be read as the right eye.
     if _ACTION_UNIT.match(column):
         return None
     words = words_of(column)
@@ -59,6 +60,7 @@ def eye_of(column: str) -> Eye | None:
         for word, following in zip_longest(words, words[1:], fillvalue="")
         if (side := _side(word)) and not (len(word) == 1 and _NO_SIDE_BEFORE.fullmatch(following))
     }
+    # A name with both sides (left_minus_right) is of neither eye.
     return sides.pop() if len(sides) == 1 else None
 
 
@@ -77,12 +79,14 @@ def left_and_right(eyes: Sequence[Eye | None]) -> tuple[int, int] | None:
 def _side(word: str) -> Eye | None:
     """The eye of one word in small letters."""
     sided = _SIDED.fullmatch(word)
+    # The group that did not match is None.
     return _SIDES.get(word if sided is None else sided["first"] or sided["last"])
 
 
 def is_of_lids(column: str) -> bool:
     """Whether a column's name says that it is the opening or closure of an eye, not a pupil or a gaze."""
     words = words_of(column)
+    # Words in pairs, too: eyeBlinkLeft has eye and blink as separate words.
     return not _LIDS.isdisjoint({*words, *("".join(pair) for pair in pairwise(words))})
 
 
@@ -91,6 +95,7 @@ def is_high_when_shut(column: str) -> bool:
     words = words_of(column)
     pairs = {"".join(pair) for pair in pairwise(words)}
     known = pairs.union(words)
+    # Blink and closed mean a closure only without a word of distance: blink_ear is an opening.
     return not _CLOSURES.isdisjoint(known) or (not _SHUT.isdisjoint(known) and _OPENINGS.isdisjoint(known))
 
 
@@ -111,7 +116,9 @@ _WORDS = {"true": True, "1": True, "1.0": True, "false": False, "0": False, "0.0
 
 def is_validity(name: str) -> bool:
     """Whether a column's name is one of validity: valid, success, EAR2D6_valid, BS_Valid, valid_left."""
+    # Without the side: left_valid and valid_left are the same.
     words = [word for word in words_of(name) if eye_of(word) is None]
+    # First or last word only: in the middle of a name the word says something else.
     return bool(words) and not _VALID.isdisjoint({words[0], words[-1]})
 
 
@@ -146,12 +153,14 @@ def unseen_rows(
     for name in map(str, table.columns):
         rows, why = _doubted(table[name], path)
         heeding = [column for column in columns if _is_about(name, column)]
+        # No line about a validity that doubts nothing.
         if not rows.any() or not heeding:
             continue
         eye = "" if len(heeding) == len(columns) else f" of {', '.join(heeding)}"
         notes.append(f"{path.name}: {rows.sum():,} of {rows.size:,} frames{eye} {why}: treated as missing")
         for column in heeding:
             unseen[column] |= rows
+    # A column of zeros is more likely misnamed than a recording without one valid frame.
     if any(rows.all() for rows in unseen.values()):
         raise InputError(f"{'; '.join(notes)}; no frames are left: remove the column if it is wrong")
     return unseen, notes + _doubtful(table, path)
@@ -163,6 +172,7 @@ def _doubted(column: pd.Series, path: Path) -> tuple[NDArray[np.bool_], str]:
     if name.lower() == CONFIDENCE_COLUMN:
         return _not_sure(column, path), f"have a '{name}' below {LEAST_CONFIDENCE:g}"
     if name.lower() in VALID_COLUMNS:
+        # By its exact name a blank is not valid; under any other name a blank says nothing.
         return _not_valid(_cells(column, blank="0"), path), f"are not valid by '{name}'"
     if is_validity(name) and not _other_words(cells := _cells(column, blank="1")):
         return _not_valid(cells, path), f"are not valid by '{name}'"
@@ -175,6 +185,7 @@ def _is_about(name: str, column: str) -> bool:
     if not _OF_OTHERS.isdisjoint(words_of(name)) or (side and eye and side != eye):
         return False
     words = _own_words(name)
+    # With and without general words: BS_Valid is about BS_gap and about eye_BS_gap.
     beginnings = {*accumulate(words_of(column)), *accumulate(_own_words(column))}
     return not words or "".join(words) in beginnings
 
@@ -184,6 +195,7 @@ def _own_words(name: str) -> list[str]:
 
 
 def _cells(column: pd.Series, blank: str) -> "pd.Series[str]":
+    # Text, numbers and booleans alike: trackers write 1, 1.0 and True.
     return column.map(lambda cell: blank if pd.isna(cell) else str(cell).strip().lower())
 
 
@@ -255,13 +267,16 @@ def choose_columns(table: pd.DataFrame, named: Sequence[str], path: Path) -> tup
             raise InputError(f"{path.name} has no column '{name}'{_near_or_plausible(name, candidates)}")
     if named:
         return _distinct(table, list(dict.fromkeys(named)), path)
+    # Columns of a track, known by their exact names, win over any guess.
     tracked = [name for name in DISTANCE_COLUMNS if name in table.columns]
     if tracked:
         return tracked, []
+    # Columns of 0 and 1 mark blinks, they do not measure an opening.
     measures = [name for name in candidates if not _is_presence(table[name])]
     if len(measures) == 1 or len(candidates) == 1:
         return measures or candidates, []
     lids = [name for name in measures if is_of_lids(name)]
+    # Other columns of numbers (gaze, pupil) come with most trackers.
     if len(lids) == 2 and eye_pair(lids) is not None:
         measures = lids
     if len(measures) == 2 and eye_pair(measures) is not None:
@@ -276,6 +291,7 @@ def _distinct(table: pd.DataFrame, named: list[str], path: Path) -> tuple[list[s
     notes = []
     measures = [name for name in named if not _is_presence(table[name])]
     for name in named:
+        # Two eyes never have the same values in every frame.
         twin = next((one for one in kept if table[one].equals(table[name])), None)
         if measures and name not in measures:
             notes.append(f"{path.name}: '{name}' has only 0 and 1, so it is not an eye opening: ignored")
@@ -290,6 +306,7 @@ def _distinct(table: pd.DataFrame, named: list[str], path: Path) -> tuple[list[s
 
 def _is_presence(column: pd.Series) -> bool:
     """Whether a column says by 0 and 1 alone that something is there, as OpenFace's AU45_c."""
+    # Both values must occur: of a column of zeros nobody knows what it is.
     return column.dtype.kind in "fiub" and set(column.dropna().unique().tolist()) == {0, 1}
 
 
@@ -312,6 +329,7 @@ def _not_chosen(table: pd.DataFrame, candidates: Sequence[str]) -> str:
 
 def _is_of_another_kind(name: str) -> bool:
     """Whether a column's name is one of frame numbers, times or validity."""
+    # Such columns are decimals as well and would be taken for distances.
     return name.lower() in INDEX_COLUMNS or is_validity(name) or is_time(name)
 
 
@@ -379,6 +397,7 @@ def without_what_is_not_measured(
     eye = eye_of(column)
     label = f"{path.name}: '{column}'" + (f" ({eye} eye)" if eye else "")
     kinds = [_Kind("repeats one value for at least one second", _frozen_runs(opening, fps), measured=1)]
+    # In a long frame lids may close and open; in a turned column 0 is a shut eye.
     if not turned and fps >= LEAST_JUMP_FPS:
         kinds.append(_zeros(opening))
     notes, kept = [], opening.copy()
@@ -396,6 +415,7 @@ def _frozen_runs(values: Array, fps: float) -> list[tuple[int, int]]:
 
     Only where the series has noise elsewhere; in a curve without noise a lid at rest repeats its value.
     """
+    # NaN differs from itself, so gaps never count as repeats.
     repeats = np.concatenate([[False], values[1:] == values[:-1]])
     # Repeats begin one row after the value that they repeat.
     spans = [(a - 1, b) for a, b in runs(repeats) if b - a + 1 >= FROZEN_S * fps]
@@ -405,6 +425,7 @@ def _frozen_runs(values: Array, fps: float) -> list[tuple[int, int]]:
     if not spans or not _has_noise(values, elsewhere, fps):
         return []
     low, middle, high = np.percentile(values[elsewhere], [0, OPEN_PERCENTILE, 100])
+    # Shut lids and a clipped maximum repeat values for good reasons.
     shut = low + SHUT_SHARE * (middle - low)
     return [(start, stop) for start, stop in spans if shut < values[start] < high]
 
@@ -412,6 +433,7 @@ def _frozen_runs(values: Array, fps: float) -> list[tuple[int, int]]:
 def _has_noise(values: Array, elsewhere: NDArray[np.bool_], fps: float) -> bool:
     """Whether a second or more elsewhere goes up and down as noise does, and seldom repeats a value."""
     steps = np.diff(values)[elsewhere[1:] & elsewhere[:-1]]
+    # Less than a second does not show whether there is noise.
     if steps.size < fps:
         return False
     signs = np.sign(steps[steps != 0])
@@ -427,6 +449,7 @@ def _zeros(values: Array) -> _Kind:
     if not zero.any() or not others.size:
         return _Kind(what, [])
     opening = float(np.percentile(others, OPEN_PERCENTILE))
+    # A blink reaches values near 0 by itself, so zeros next to them are plausible.
     if others.min() < NEAR_ZERO * opening:
         return _Kind(what, [])
     low = values < JUMP_SHARE * opening
@@ -482,6 +505,7 @@ def opening_of(
         )
     if not (by_name if inverted is None else inverted) or not known.size:
         return values, ""
+    # At least 1, the greatest value of most closures, also where no blink was complete.
     top = max(1.0, *(_top(one[np.isfinite(one)]) for one in same_kind))
     why = "as its name says" if inverted is None else "as set by --inverted"
     return (
@@ -496,6 +520,7 @@ def _top(known: Array) -> float:
         return 0.0
     count = min(GLITCHES, known.size)
     highest = np.sort(np.partition(known, -count)[-count:])
+    # By the 0.5 a greatest value up to 1, as closures have, is never a glitch.
     return float(highest[0] if highest[-1] > GLITCH * max(highest[0], 0.5) else highest[-1])
 
 

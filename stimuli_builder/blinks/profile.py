@@ -87,6 +87,7 @@ class BlinkProfile:
                     f"profile {self.profile_id}: {name} needs as many samples as closure, "
                     f"{self.closure.size}; got {values.size}"
                 )
+        # Strictly: both phases need a sample, and the end must be inside.
         if not 0 <= self.onset_index < self.minimum_index < self.end_index < self.closure.size:
             raise InputError(
                 f"profile {self.profile_id}: onset {self.onset_index}, minimum {self.minimum_index} and end "
@@ -106,6 +107,7 @@ class BlinkProfile:
     @property
     def duration_frames_30fps(self) -> float:
         """Length from onset to end in frames of a 30 fps clip."""
+        # Frames of 30 fps are the unit of the paper.
         return (self.down_frames + self.up_frames) * 30 / self.fps
 
     @property
@@ -156,6 +158,7 @@ def to_natural_closure(profile: BlinkProfile) -> BlinkProfile:
 
 def _stretch(closure: Array) -> Array:
     low, high = float(closure.min()), float(closure.max())
+    # A flat curve would be divided by rounding errors.
     if high - low < 1e-6:
         raise InputError("a profile without closing cannot be stretched to full closure")
     return (closure - low) / (high - low)
@@ -170,6 +173,7 @@ def phase_spline(samples: Array, length_frames: int) -> Array:
     # Here, for it takes a third of a second: workers that render need only the types of this file.
     from scipy.interpolate import PchipInterpolator
 
+    # Over 0 to 1: only the shape of the phase counts, not its length.
     spline = PchipInterpolator(np.linspace(0.0, 1.0, samples.size), samples)
     return np.asarray(spline(np.linspace(0.0, 1.0, length_frames + 1)), dtype=np.float64)
 
@@ -179,10 +183,12 @@ def resample_phases(profile: BlinkProfile, down_frames: int, up_frames: int) -> 
     if down_frames < 1 or up_frames < 1:
         raise InputError(f"a phase needs one frame or more, got {down_frames} down and {up_frames} up")
 
+    # Each phase by itself, so that the minimum stays where it belongs.
     def rescale(closure: Array) -> Array:
         middle = profile.minimum_index
         down = phase_spline(closure[profile.onset_index : middle + 1], down_frames)
         up = phase_spline(closure[middle : profile.end_index + 1], up_frames)
+        # Both phases hold the minimum; it counts once.
         return np.concatenate([down, up[1:]])
 
     def rescale_if(values: Array | None) -> Array | None:
@@ -203,6 +209,7 @@ def resample_phases(profile: BlinkProfile, down_frames: int, up_frames: int) -> 
 def with_minimum_at_peak(profile: BlinkProfile) -> BlinkProfile:
     """Move the minimum to the sample of greatest closure; in a generated blink it may be next to its
     place."""
+    # Only between onset and end: samples before the onset are of the open eye.
     peak = profile.onset_index + int(profile.closure[profile.onset_index : profile.end_index + 1].argmax())
     if not profile.onset_index < peak < profile.end_index:
         raise InputError(
@@ -218,6 +225,7 @@ def split_duration(duration_frames_30fps: float, down_fraction: float) -> tuple[
     total = round(duration_frames_30fps * SAMPLES_PER_CLIP_FRAME) if finite else 0
     if not 2 <= total <= 3000:
         raise InputError(f"a blink lasts between 0.2 and 300 frames at 30 fps, got {duration_frames_30fps:g}")
+    # Rounding may leave a phase without a sample.
     down = min(max(round(total * down_fraction), 1), total - 1)
     return down, total - down
 
@@ -243,6 +251,7 @@ TABLE_COLUMNS = {
 
 def write_profile_table(path: Path, profiles: Sequence[BlinkProfile]) -> None:
     """Write profiles as a CSV of `TABLE_COLUMNS`; onset and end are the first and last sample."""
+    # A table without blinks still has its header.
     samples = [_samples(profile) for profile in profiles] or [pd.DataFrame(columns=list(TABLE_COLUMNS))]
     with whole_file(path) as partial:
         write_table(partial, pd.concat(samples))
@@ -253,6 +262,7 @@ def _samples(profile: BlinkProfile) -> pd.DataFrame:
 
     def column(values: Array | None) -> Array:
         absent = np.full(profile.closure.size, np.nan)
+        # Six decimals are finer than any measurement, and equal on every computer.
         return (absent if values is None else np.round(values, 6))[part]
 
     return pd.DataFrame(
@@ -278,12 +288,14 @@ def read_profile_table(path: Path) -> list[BlinkProfile]:
                 f"{path.name} is not a table of profiles (NAME.profiles.csv of `stimuli blinks`): the column "
                 f"'{name}' is missing; it has {there}"
             )
+    # Unsorted: in the order of the file, which is that of time.
     groups = table.groupby("profile_id", sort=False)
     return [_profile(str(name), group, path) for name, group in groups]
 
 
 def _profile(profile_id: str, rows: pd.DataFrame, path: Path) -> BlinkProfile:
     offset = rows["from_minimum_frames"].to_numpy()
+    # Whole numbers only: a table edited in a spreadsheet may have gaps or fractions.
     if offset.dtype.kind != "i" or (np.diff(offset) != 1).any() or not offset[0] < 0 < offset[-1]:
         raise InputError(
             f"{path.name}: profile {profile_id}: from_minimum_frames must rise by 1 from below 0 to above 0"
@@ -291,6 +303,7 @@ def _profile(profile_id: str, rows: pd.DataFrame, path: Path) -> BlinkProfile:
 
     def column(name: str) -> Array | None:
         values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=np.float64)
+        # A column that is empty throughout means that it was not measured.
         return None if np.isnan(values).all() else values
 
     closure = column("closure")
@@ -306,8 +319,10 @@ def _profile(profile_id: str, rows: pd.DataFrame, path: Path) -> BlinkProfile:
         minimum_index=int(-offset[0]),
         down_frames=int(-offset[0]),
         up_frames=int(offset[-1]),
+        # The amplitude has no column: it is the range of the closure.
         amplitude=float(np.ptp(closure)),
         source=f"profile table {path.name}",
+        # An empty cell is read as NaN, not as text.
         eye=EYES.get(str(eye) if isinstance(eye, str) else ""),
         recording=path.stem,
         fps=PROFILE_FPS,

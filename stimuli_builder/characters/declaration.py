@@ -36,6 +36,7 @@ class Picture(_Declared):
 
     @model_validator(mode="after")
     def _stays_in_folder(self) -> "Picture":
+        # A character may come from a stranger: its files must not point elsewhere on the disk.
         if Path(self.file).is_absolute() or ".." in Path(self.file).parts:
             raise ValueError(f"file '{self.file}' must be inside the character's folder")
         return self
@@ -77,6 +78,7 @@ class LowerLid(_Declared):
     @property
     def vertical_mm(self) -> tuple[float, ...]:
         """The vertical positions baked, ascending, in mm."""
+        # A set first: the grid has every vertical position once for each horizontal one.
         return tuple(sorted({pose.vertical_mm for pose in self.poses}))
 
     @property
@@ -87,11 +89,14 @@ class LowerLid(_Declared):
     @model_validator(mode="after")
     def _full_grid(self) -> "LowerLid":
         given = sorted((pose.vertical_mm, pose.horizontal_mm) for pose in self.poses)
+        # Poses between those baked are interpolated in both directions, which needs a full grid.
         needed = sorted((v, h) for v in self.vertical_mm for h in self.horizontal_mm)
         if given != needed:
             raise ValueError("lower_lid.poses must have every pair of vertical_mm and horizontal_mm once")
+        # The lower lid at rest must be a picture, not a mixture of poses.
         if 0.0 not in self.vertical_mm or 0.0 not in self.horizontal_mm:
             raise ValueError("lower_lid.poses must include the resting pose (vertical_mm 0, horizontal_mm 0)")
+        # A video is compressed in color; the gray of a matte is an amount and must be exact.
         if any(matte.frame is not None for matte in self.mattes):
             raise ValueError(
                 "lower_lid.mattes must be pictures; only base, levels and poses may be frames of a video"
@@ -107,6 +112,7 @@ class Declaration(_Declared):
     a separate character, `alder@2`; poses of the lower lid added to a character count further.
     """
 
+    # Names are folders and parts of addresses, on every file system.
     name: str = Field(pattern="^[a-z0-9][a-z0-9_-]*(@[1-9][0-9]{0,3})?$")
     version: int = Field(1, ge=1)
     label: str
@@ -123,6 +129,7 @@ class Declaration(_Declared):
     @model_validator(mode="after")
     def _version_named(self) -> "Declaration":
         _, _, named = self.name.partition("@")
+        # More is possible: poses added later raise the version, but not the name.
         if named and self.version < int(named):
             raise ValueError(f"version of '{self.name}' must be {named} or more; it is {self.version}")
         return self
@@ -131,6 +138,7 @@ class Declaration(_Declared):
     def _consistent(self) -> "Declaration":
         closures = [level.closure for level in self.levels]
         _require_ascending(closures, "levels")
+        # Closures outside the range of the levels could not be interpolated.
         if closures[0] != 0.0 or closures[-1] != 1.0:
             raise ValueError("levels must run from closure 0 (open) to closure 1 (closed)")
         _require_inside(self.crop, self.size_px, "crop")
@@ -192,6 +200,7 @@ def read_declaration(folder: Path) -> Declaration:
 
 
 def _first_fault(error: ValidationError) -> str:
+    # One fault at a time: the first often causes the others.
     fault = error.errors()[0]
     where = ".".join(str(part) for part in fault["loc"])
     return f"{where}: {wrong_value(fault)}" if where else wrong_value(fault)
@@ -199,7 +208,9 @@ def _first_fault(error: ValidationError) -> str:
 
 def declaration_toml(declaration: Declaration) -> str:
     """Write a declaration as TOML text; reading it back gives an equal declaration."""
+    # None has no form in TOML; a key that is left out reads as its default.
     content = declaration.model_dump(exclude_none=True)
+    # Tables must come after all plain keys, or these would belong to the last table.
     tables = {key: content.pop(key) for key in ("levels", "lower_lid", "provenance") if key in content}
     lines = [f"{key} = {_toml_value(value)}" for key, value in content.items()]
     for level in tables["levels"]:
@@ -220,11 +231,13 @@ def _toml_pairs(table: dict[str, Any]) -> list[str]:
 
 
 def _toml_value(value: Any) -> str:
+    # Before int, of which bool is a kind.
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, str):
+        # The backslash first, or it would escape those that are added for quotes.
         escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
         return f'"{escaped}"'
     if isinstance(value, dict):
@@ -244,6 +257,7 @@ def write_bytes(file: Path, content: bytes) -> None:
 def write_picture(folder: Path, file: str, image: NDArray[np.uint8]) -> Picture:
     """Write (h, w, 3) or (h, w) code values as lossless WebP; return what the declaration says of it."""
     buffer = BytesIO()
+    # With `lossless` quality is the effort of compression, not a loss.
     Image.fromarray(image).convert("RGB").save(buffer, "WEBP", lossless=True, quality=90, method=4)
     return write_bytes_declared(folder, file, buffer.getvalue())
 
@@ -268,6 +282,7 @@ CLOSURES = (0.0, 0.25, 0.5, 1.0)
 
 def draw_crop(closure: float, lift: int = 0) -> NDArray[np.uint8]:
     """Gray skin with one dark eye: the lid covers it from above, the lower lid lifts by whole pixels."""
+    # Integers only: the pictures have the same bytes everywhere.
     image = np.full((CROP[3], CROP[2], 3), 180, np.uint8)
     top = 2 + round(12 * closure)
     image[top : 14 - lift, 8:32] = (40, 60, 90)
@@ -293,6 +308,7 @@ def write_example_character(folder: Path, lower_lid: bool = True) -> Path:
             for v in (0.0, 0.5, 1.0)
             for h in (0.0, 1.0)
         ]
+        # Two mattes are the least: nothing is covered when open, all is when closed.
         covered = [(w, np.full((CROP[3], CROP[2]), round(255 * w), np.uint8)) for w in (0.0, 1.0)]
         mattes = [
             Level(closure=w, **write_picture(folder, f"matte_{w}.webp", m).model_dump()) for w, m in covered

@@ -62,12 +62,15 @@ def performance_curve(
     InputError
         The speech cannot be read, or lasts less than the clip.
     """
+    # The seed of the blinks is drawn first, so that it is the same with every timing.
     rng = generator("performance", seed, family, number)
     shown = _performed(settings, int(rng.integers(2**31)), rng, beside)
+    # 0.1 ms: far below a sample, and short in the manifest.
     blinks = tuple(round(blink.onset_s, 4) for blink in shown.blinks)
     closure, other = _rounded(shown.left), _rounded(shown.right)
     vertical, horizontal = _lower_lid(shown, settings.lower_lid)
     return ClipCurve(
+        # Eyes alike: the left curve is shown by both.
         closure=closure,
         closure_other=other if settings.eyes == "separate" else None,
         onset_sample=int(blinks[0] * PROFILE_FPS) if blinks else 0,
@@ -92,9 +95,11 @@ def _performed(
     if settings.performance == "events":
         events = [Event(settings.event, time_s) for time_s in settings.events_s]
         stretches = _speech(settings, beside)
+        # Blinks at declared times and those that come with speech add up.
         events += speech_events(stretches)
         changes = speech_states(stretches, settings.state) if stretches else []
     elif settings.performance != "intervals":
+        # Read before the intervals are replaced: the timer takes its mean from them.
         mean_s = parameters.mean_interval_s(settings.state)
         parameters = _without_spontaneous(parameters)
         if settings.performance == "uniform":
@@ -102,6 +107,7 @@ def _performed(
     return perform(
         settings.seconds,
         PROFILE_FPS,
+        # Two speakers of one dialogue would otherwise blink at the same moments.
         seed=seed_of_speaker(seed, speaker) if speaker else seed,
         state=settings.state,
         events=events,
@@ -113,6 +119,7 @@ def _performed(
 
 def _parameters(settings: RenderSettings) -> Parameters:
     chosen = default_parameters()
+    # Long closures are complete, too, but keep the eyes shut for longer than a blink.
     if settings.amplitude == "full":
         chosen = chosen.with_profile(complete_share=1.0, long_share=0.0)
     if settings.blinks_per_minute is not None:
@@ -121,6 +128,7 @@ def _parameters(settings: RenderSettings) -> Parameters:
 
 
 def _without_spontaneous(parameters: Parameters) -> Parameters:
+    # A law without an end does not exist; an interval beyond every clip does the same.
     never = {state: Law("fixed", NEVER_S) for state in parameters.intervals}
     return parameters.with_intervals(never)
 
@@ -167,6 +175,7 @@ def _lower_lid(shown: Performance, lower: str) -> tuple[Array | None, Array | No
         return None, None
     vertical = np.round(LOWER_UP_MM * (shown.left_lower_up + shown.right_lower_up) / 2, DECIMALS)
     horizontal = np.round(LOWER_IN_MM * (shown.left_lower_in + shown.right_lower_in) / 2, DECIMALS)
+    # A curve has both motions or none: the one that is switched off stays at 0.
     still = np.zeros(len(vertical))
     return (
         vertical if lower in ("both", "vertical") else still,
@@ -209,6 +218,7 @@ def planned_clips(experiment: Experiment, options: Options) -> list[PlannedClip]
         A cell asks for something its character or profile cannot give; the line names the cell. Or two
         levels would give the same clips.
     """
+    # First, as it renders nothing and names the mistake in the declaration.
     check_levels(experiment)
     return list(_planned(experiment, options))
 
@@ -234,6 +244,7 @@ def _planned(experiment: Experiment, options: Options) -> Iterator[PlannedClip]:
         try:
             yield _plan(experiment, spec, options)
         except InputError as error:
+            # A fault of a character or profile does not know for which cell it was wanted.
             raise InputError(f"cell {spec.cell}, exemplar {spec.exemplar}: {error}") from error
 
 
@@ -247,6 +258,7 @@ def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedCl
         curve, repeated = performance_curve(settings, family, spec.exemplar, seed, options.base_folder), False
     else:
         shown = exemplar(settings, family, spec.exemplar, seed, options.base_folder)
+        # Drawn by cell: the phase of a blink within a frame is the same at every rebuild.
         timing = Timing.drawn(settings.fps, shown.phase_samples, seed, spec.cell, spec.exemplar)
         curve, repeated = clip_curve(shown.profile, timing, settings.lower_lid), shown.repeated
     curve, held = shown_by(curve, settings, character.lower_range_mm)
@@ -259,6 +271,7 @@ def _plan(experiment: Experiment, spec: ClipSpec, options: Options) -> PlannedCl
 
 def exemplar_family(key: str) -> str:
     """An exemplar key without its number: what all exemplars of a cell have in common."""
+    # Keys end in a slash and the number of the exemplar.
     return key.rpartition("/")[0]
 
 
@@ -269,11 +282,13 @@ def check_look(settings: RenderSettings, character: Geometry) -> None:
             f"character '{settings.character}' has no lower-lid layer; use lower_lid = 'none' or a "
             "character baked with one"
         )
+    # Refused, not ignored: the clip would be labeled with a gaze that it does not show.
     if settings.gaze_mm and settings.character in DRAWN:
         raise InputError(
             f"character '{settings.character}' is drawn with eyes that look straight ahead; remove gaze_mm, "
             "set it to 0, or use a baked face"
         )
+    # Only for its errors: a size that the character cannot be shown at.
     character.scaled(settings.width_px, settings.height_px)
 
 
@@ -306,6 +321,7 @@ def with_life(curve: ClipCurve, strength: float, seed: int, character: Geometry)
     )
 
 
+# Asked once for all clips of a build; the import loads the video library.
 @lru_cache(maxsize=1)
 def _encoder() -> str:
     from stimuli_builder.clips.encode import encoder_signature
@@ -349,6 +365,7 @@ def render_single(clip: SingleClip, out: Path) -> RenderedClip:
     life_seed = int(generator("life", clip.seed, clip.profile, clip.exemplar).integers(2**31))
     curve = with_life(curve, settings.life, life_seed, character)
     job = ClipJob(look_of(settings, Options(barcode=clip.barcode)), curve, life_seed)
+    # An interrupted rendering leaves no half clip under the wanted name.
     with whole_file(out) as temporary:
         temporary.write_bytes(render(job))
     return RenderedClip(curve, job.frames, int(curve.onset_sample / samples_per_frame(settings.fps)))
@@ -369,6 +386,7 @@ def _blink(clip: SingleClip) -> Exemplar:
         raise InputError(
             f"profile {clip.profile} shows one eye; --eyes separate needs a profile of both eyes"
         )
+    # The second curve would otherwise move the other eye in spite of --eyes alike.
     if settings.eyes == "alike":
         profile = replace(profile, closure_other=None)
     return Exemplar(amplitude_of(profile, settings.amplitude), repeated=False, phase_samples=0)

@@ -68,6 +68,7 @@ class OpeningMeter:
     """
 
     def __init__(self, character: LevelSet, opening_mm: float) -> None:
+        # Motion between blinks is undone at full resolution, before pixels are left out.
         self._whole, self._character = character, character.thinned(STEP_PX)
         self._opening_mm = opening_mm
         rows, columns = character.window.slices
@@ -96,8 +97,10 @@ class OpeningMeter:
         curve = _curve_of(clip)
         if curve.lower_vertical_mm is not None and self._character.read_lower is None:
             raise InputError("its lower lid moves, but its character's does not")
+        # Most frames of a clip show the open eye: equal pictures are computed once.
         known: dict[bytes, list[float]] = {}
         rows = []
+        # Inputs are texts; only an explicit false means sharp frames.
         blur = clip.inputs.get("motion_blur") != "false"
         for samples, weights in frame_windows(len(curve.closure), clip.fps, blur):
             key = same_picture(curve, samples, weights)
@@ -114,6 +117,7 @@ class OpeningMeter:
         return [eye.project(luma if eye.left_eye else other) for eye in self._eyes]
 
     def _opening(self, projected: list[list[float]]) -> Array:
+        # Turned round, since `interp` needs ascending numbers and the table falls with closure.
         closures = self._character.closures[::-1]
         columns = [
             np.interp(values, eye.table[::-1], closures)
@@ -136,7 +140,9 @@ def _eyes(character: LevelSet) -> list[_Eye]:
         columns = slice(int(where[0]), int(where[-1]) + 1) if len(where) else slice(0, 0)
         opened, closed = levels[0][:, columns], levels[-1][:, columns]
         energy = float(np.sum((opened - closed) ** 2))
+        # A half in which nothing changes cannot show a blink, as of a character with one eye.
         if energy > 0:
+            # Divided by the energy: open gives 1, closed 0.
             template = (opened - closed) / energy
             table = np.array([np.sum((level[:, columns] - closed) * template) for level in levels])
             # Equal steps could not be turned round.
@@ -161,7 +167,9 @@ def _curve_of(clip: Clip) -> ClipCurve:
 
 def _luma(light: NDArray[np.floating]) -> Array:
     """Luma in 0-1 of 16-bit linear light (h, w, 3)."""
+    # Luma is a sum of gamma-encoded values, as in the video; a sum of light differs.
     code = GAMMA[np.clip(np.round(light), 0, 65535).astype(np.int64)]
+    # Weights of BT.709.
     return np.asarray(code @ np.array([0.2126, 0.7152, 0.0722]), np.float64)
 
 
@@ -227,8 +235,10 @@ def verify(folder: Path, beside: Path | None = None, progress: Progress = silent
         There is no manifest that can be read.
     """
     manifest = read_manifest(folder)
+    # Levels of a character are loaded once for all its clips of a size.
     clips = sorted(manifest.files, key=lambda clip: (clip.inputs.get("character", ""), clip.width_px))
     meters = _Meters(beside)
+    # Uploads were converted by a server: no builder promised their encoding either.
     is_own = manifest.made_elsewhere or manifest.program_version == UPLOADED
     findings: list[Finding] = []
     brightness: dict[str, tuple[float, float]] = {}
@@ -257,6 +267,7 @@ def _own_problems(path: Path, clip: Clip | CheckClip) -> Iterator[str]:
         return
     if conversion.changes:
         yield f"browsers cannot play it; it needs a conversion ({'; '.join(conversion.changes)})"
+    # Rates such as 30000/1001 have no exact decimal.
     if abs(float(conversion.rate) - clip.fps) > RATE_TOLERANCE * clip.fps:
         yield f"expected {clip.fps:g} frames per second, got {float(conversion.rate):g}"
 
@@ -275,11 +286,13 @@ def _check(
     if file_sha256(path) != clip.sha256:
         return [f"its bytes differ from the {MANIFEST_NAME} (another sha256)"], None
     try:
+        # Checks of motion and clips without a curve promise no opening.
         meter = None if isinstance(clip, CheckClip) or not clip.closure else meters.of(clip)
     except (InputError, ValueError) as error:
         return [f"its inputs in the {MANIFEST_NAME} cannot be read ({error})"], None
     try:
         decoded = _decoded(path, clip, meter, is_own=is_own)
+    # A damaged file can fail in the decoder, in the reading or in the shape of a picture.
     except (av.error.FFmpegError, InputError, ValueError) as error:
         return [f"cannot be decoded ({error})"], None
     measured, problems = decoded.opening_mm, decoded.problems
@@ -293,6 +306,7 @@ def _check(
         return [str(error)], None
     if len(promised) != len(measured):
         return [f"its curve is {len(promised)} frames long, the clip {len(measured)}"], None
+    # The worse eye of each frame.
     off = np.abs(measured - promised).max(axis=1)
     worst = float(off.max())
     if worst > TOLERANCE_MM:
@@ -316,11 +330,13 @@ def _decoded(path: Path, clip: Clip | CheckClip, meter: OpeningMeter | None, *, 
             # Only the first and the last picture: all of a clip would fill the memory.
             ends = [*ends[:1], frame]
             if meter is not None and fits:
+                # The first rows of yuv420p are luma; the two chroma planes follow below.
                 luma = frame.to_ndarray(format="yuv420p")[: frame.height]
                 measured.append(meter.measured_mm(steady(luma, len(measured))[None])[0])
         problems = list(_shape_problems(stream, times, clip))
         if not is_own:
             problems += _timing_problems(stream, times, clip)
+    # The slower examination only where nothing is wrong so far.
     if is_own and not problems:
         problems = list(_own_problems(path, clip))
     if not times:
@@ -360,6 +376,7 @@ def _shape_problems(stream: Any, times: list[Fraction | None], clip: Clip | Chec
 
 
 def _timing_problems(stream: Any, times: list[Fraction | None], clip: Clip | CheckClip) -> Iterator[str]:
+    # 30000/1001 and its kin are exact fractions, but decimals in the manifest.
     due = 1 / Fraction(clip.fps).limit_denominator(1001)
     if any(at is None or abs(at - k * due) > due / 100 for k, at in enumerate(times)):
         yield f"its frames are not spaced evenly at {clip.fps:g} fps"
@@ -388,6 +405,7 @@ class _Meters:
         self, name: str, sha256: str, size_px: tuple[int, int], movement: Movement
     ) -> OpeningMeter | None:
         folder_name = name if name in shipped_names() or (self._folder / name).is_dir() else None
+        # Of a character that was baked again, the levels say nothing about this clip.
         if not folder_name or fingerprint(folder_name, self._beside) != sha256:
             return None
         return OpeningMeter(

@@ -34,6 +34,7 @@ from stimuli_builder.video import Picture
 
 def cache_folder() -> Path:
     """Folder for environments shared by all projects of a user (XDG_CACHE_HOME, else ~/.cache)."""
+    # An empty variable counts as not set, as the XDG specification says.
     base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     return Path(base) / "palpebra"
 
@@ -58,6 +59,7 @@ def ensure_environment(folder: Path, python: str, requirements: Path, what: str,
         The environment cannot be made, or the probe fails in it; an unfinished one is removed.
     """
     interpreter = folder / "bin" / "python"
+    # Written last: a folder without it was left by an interrupted installation.
     ready = folder / "ready"
     if ready.exists():
         return interpreter
@@ -65,6 +67,7 @@ def ensure_environment(folder: Path, python: str, requirements: Path, what: str,
     folder.parent.mkdir(parents=True, exist_ok=True)
     try:
         run_step([*uv(), "venv", "-q", str(folder), "--python", python], f"make the environment of {what}")
+        # Without dependencies: MediaPipe names packages that its face mesh does not need.
         install = ["pip", "install", "-q", "--no-deps", "--require-hashes", "-r", str(requirements)]
         run_step([*uv(), *install, "--python", str(interpreter)], f"install {what}")
         run_step([str(interpreter), "-c", probe], f"start {what}")
@@ -104,6 +107,7 @@ NEWEST_PYTHON = (3, 12)
 
 def detector_environment() -> Path:
     """Interpreter of the detector's environment, made at first use (270 MB on disk)."""
+    # Our own Python saves a download where its version fits.
     own = sys.version_info[:2] <= NEWEST_PYTHON
     python = sys.executable if own else f"{NEWEST_PYTHON[0]}.{NEWEST_PYTHON[1]}"
     folder = cache_folder() / "face-mesh-0.10.21"
@@ -116,9 +120,11 @@ class MeshClient:
     """The worker, started with the block and ended with it; one picture at a time."""
 
     def __init__(self, interpreter: Path):
+        # -I: variables and packages of the user must not reach the worker.
         self._command = [str(interpreter), "-I", str(HERE / "mesh_worker.py")]
 
     def __enter__(self) -> Self:
+        # MediaPipe writes warnings to stderr at every start.
         self._process = subprocess.Popen(  # noqa: S603 - fixed program
             self._command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
         )
@@ -127,6 +133,7 @@ class MeshClient:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        # The end of its input is the sign for the worker to stop.
         if self._process.stdin:
             self._process.stdin.close()
         try:
@@ -154,8 +161,10 @@ class MeshClient:
         try:
             if stdin is None or stdout is None:
                 raise BrokenPipeError
+            # Length of the head, the head, the pixels: the shape in the head gives their length.
             stdin.write(struct.pack("<q", len(head)) + head + picture.tobytes())
             stdin.flush()
+            # A worker that ended gives fewer than 8 bytes, which is a struct.error.
             (length,) = struct.unpack("<q", stdout.read(8))
             return json.loads(stdout.read(length))
         except (BrokenPipeError, struct.error) as error:
@@ -187,6 +196,7 @@ def views_of(eye: Points, *, flip: bool) -> list[Region]:
     """The regions in which a face's eye (9, 2) is read; the iris network knows one side's eyes."""
     along, _, width = eye_axis(eye)
     turn = float(np.degrees(np.arctan2(along[1], along[0])))
+    # Points 0 and 5 are the canthi; lids are left out, as they move.
     middles = [(eye[0] + eye[5]) / 2 + shift * width * along for shift, _ in FACE_VIEWS]
     sides = [SIDE_OF_WIDTH * width * size for _, size in FACE_VIEWS]
     return [Region(float(x), float(y), side, flip, turn) for (x, y), side in zip(middles, sides, strict=True)]
@@ -206,6 +216,7 @@ def _about(picture: Picture, views: Sequence[Region]) -> tuple[Picture, list[Reg
 def unmirrored_face(face: Detection, width_px: int) -> Detection:
     """A face of a picture's mirror image, as the picture itself has it."""
     right = width_px - 1
+    # A mirror image swaps the eyes as well.
     points = face.points.reshape(2, -1, 2)[::-1] * [-1, 1] + [right, 0]
     iris = face.iris[::-1, IRIS_MIRRORED] * [-1, 1] + [right, 0]
     left, top, end, low = face.box
@@ -222,6 +233,7 @@ def in_both(face: Detection, others: Sequence[Detection]) -> Detection:
     """The mean of a face and of itself in the mirror image (`others`); the face where it is not there."""
     nearest = min(others, key=lambda other: max(face_distances(face, other)), default=None)
     shares = (np.inf, np.inf) if nearest is None else face_distances(face, nearest)
+    # What lies farther off is another face, and the mirror image does not show this one.
     if nearest is None or np.mean(shares) > SAME_FACE:
         return replace(face, mirror_shares=(np.inf, np.inf))
     points, iris = (face.points + nearest.points) / 2, (face.iris + nearest.iris) / 2
@@ -251,6 +263,7 @@ class FaceMesh:
         faces = self._read_twice(picture)
         if not faces or _fills(faces[0], picture):
             in_margin = self._faces_in_margin(picture)
+            # Faces that both readings found are taken from the margin, where less is cut off.
             beside = [face for face in faces if all(overlap(face, one) == 0 for one in in_margin)]
             faces = sorted(in_margin + beside, key=lambda one: one.area_px2, reverse=True)
         return [replace(one, spreads=self._spreads(picture, one)) for one in faces]
@@ -263,6 +276,7 @@ class FaceMesh:
         eyes_of_faces = []
         for face in self._client.ask("faces", picture)["faces"]:
             eyes = [eye_points(np.array(upper), np.array(lower)) for upper, lower, _ in face["eyes"]]
+            # The smaller eye decides: a face turned away has one that cannot be read.
             if min(eye_axis(eye)[2] for eye in eyes) >= least_eye_px:
                 iris = np.array([iris for _, _, iris in face["eyes"]])
                 eyes_of_faces.append(Detection(np.concatenate(eyes), iris, np.array(face["box"]), ()))
@@ -283,6 +297,7 @@ class FaceMesh:
 
         Those alone that the mirror image shows too: in the eye of a close-up the mesh sees one now and then.
         """
+        # By the longer side, so that a face that fills a wide picture gets room above as well.
         margin = round(MARGIN * max(picture.shape[:2]))
         sides = ((margin, margin), (margin, margin), (0, 0))
         wider = np.pad(picture, sides, constant_values=MARGIN_GREY)
@@ -301,7 +316,9 @@ class FaceMesh:
         seen = self._client.ask("eye", part, regions=within)["eyes"]
         contours = contours_of(seen).reshape(len(eyes), len(FACE_VIEWS), -1, 2)
         spreads = [contour_spread(one, eye_axis(eye)[2]) for one, eye in zip(contours, eyes, strict=True)]
+        # Infinite where the mirror image shows no such face, which says nothing of a cover.
         shares = np.nan_to_num(face.mirror_shares, posinf=0.0)
+        # The mean of two readings is off by half their distance.
         return tuple(np.hypot(spreads, shares / 2).tolist())
 
 
@@ -346,6 +363,7 @@ class CloseUp:
         height, width = pictures[0].shape[:2]
         regions = [
             Region(width / 2 + dx * width, height / 2 + dy * height, side * height, flip)
+            # Both sides: nobody says whether the close-up is of a left or a right eye.
             for side in REGION_SIDES
             for dx in REGION_SHIFTS
             for dy in REGION_SHIFTS
@@ -354,10 +372,13 @@ class CloseUp:
         spread = np.mean([self._spread(p, regions) for p in spread_out(pictures, JITTERED)], axis=0)
         best = np.argsort(spread)[:6]
         heights = np.array([self._heights(p, [regions[k] for k in best]) for p in pictures])
+        # Percentiles, since single readings may fail.
         low, high = np.percentile(heights, [3, 90], axis=0)
+        # A contour on a brow or cheek does not move: only lids open and close.
         travel = (high - low) / np.maximum(high, 1e-6)
         region = regions[int(best[int(np.argmax(travel - 2 * spread[best]))])]
         self._views = region.views(region.side / SIDE_OF_WIDTH)
+        # The first round reads in a rough region; the second in one laid by that reading.
         for _ in range(2):
             self._lay(spread_out(pictures, LAID_ON), region.flip)
 
@@ -381,6 +402,7 @@ class CloseUp:
             for dx, dy, scale in ((0, 0, 1.0), *JITTERS)
         ]
         answers = self._client.ask("eye", picture, regions=moved)["eyes"]
+        # Canthi only: they stay where they are while the eye blinks.
         canthi = np.array([(upper[0], upper[-1]) for upper, _, _ in answers])
         canthi = canthi.reshape(len(regions), len(JITTERS) + 1, 2, 2)
         width = np.hypot(*(canthi[:, 0, 1] - canthi[:, 0, 0]).T)
@@ -440,6 +462,7 @@ def open_detector(*, one_eye: bool, first: Sequence[Picture] = ()) -> Iterator[L
 def _refuse_faces(mesh: FaceMesh, pictures: Sequence[Picture]) -> None:
     few = spread_out(pictures, FACES_ASKED)
     faces = sum(_shows_a_face(mesh, picture) for picture in few)
+    # More than half, since in single close-ups the mesh sees faces that are not there.
     if 2 * faces > len(few):
         raise InputError(
             f"a whole face was detected in {faces} of {len(few)} frames, but --one-eye is for close-ups of "
