@@ -36,7 +36,7 @@ PAGES = {
     "monitor": ("/studies/short/monitor", "Progress"),
     "results": ("/studies/short/results", "Analysis reports"),
     "data": ("/studies/short/data", "Psych-DS dataset"),
-    "participants": ("/studies/short/participants", "12 of 12"),
+    "participants": ("/studies/short/participants", "8 of 8"),
     "settings": ("/studies/short/settings", "Paused: no new participants"),
     "settings-recruitment": ("/studies/short/settings?part=recruitment", "Recruited through"),
     "settings-languages": ("/studies/short/settings?part=languages", "Buttons, hints and errors"),
