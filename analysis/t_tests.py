@@ -127,6 +127,7 @@ def compare_groups(
             )
     pairs = list(combinations(range(len(groups)), 2))
     rows = [_unequal(names[a], names[b], groups[a], groups[b]) for a, b in pairs]
+    # The studentized range of as many groups, with the df of each pair.
     games = [float(tukey(np.array([row.t]), len(groups), row.df)[0]) for row in rows]
     tests = _corrected(rows, bounds, games)
     return MeansAnalysis(
@@ -151,6 +152,7 @@ def compare_with_value(
     rows = []
     for name, group in zip(names, groups, strict=True):
         where = name if factor is None else f"{factor}={name}"
+        # Equal values give a standard error of 0, hence no t.
         if len(group) < 2 or np.ptp(group) == 0:
             raise InputError(
                 f"{where}: expected means of two participants or more that differ, got "
@@ -158,6 +160,7 @@ def compare_with_value(
             )
         n, sd = len(group), float(group.std(ddof=1))
         difference, se = float(group.mean()) - value, sd / n**0.5
+        # The size of one sample: t and d differ by the root of n. The approximate interval is that of a mean.
         size = _Size(difference / se, n**-0.5, n - 1, n, float(stats.norm.ppf(0.975)) * n**-0.5)
         rows.append(_tested(name, f"{value:g}", difference, se, n - 1, size))
     tests = _corrected(rows, bounds, [None] * len(rows))
@@ -167,6 +170,7 @@ def compare_with_value(
 def _unequal(first: str, second: str, a: Floats, b: Floats) -> MeanTest:
     n = np.array([len(a), len(b)])
     variances = np.array([a.var(ddof=1), b.var(ddof=1)])
+    # One group may be constant; the other still gives a standard error.
     if not variances.any():
         raise InputError(f"neither {first} nor {second} varies between participants; there is no t test")
     errors = variances / n
@@ -177,6 +181,7 @@ def _unequal(first: str, second: str, a: Floats, b: Floats) -> MeanTest:
     pooled_df = int(n.sum() - 2)
     pooled = float(((n - 1) * variances).sum() / pooled_df) ** 0.5
     scale, d = float((1 / n).sum()) ** 0.5, difference / pooled
+    # The large-sample error of d, as R's effsize computes it.
     error = ((scale**2 + d**2 / pooled_df / 2) * float(n.sum()) / pooled_df) ** 0.5
     approximate = float(stats.t.ppf(0.975, pooled_df)) * error
     # n1 n2 / (n1 + n2) takes the place of n in the Bayes factor of two groups.
@@ -206,12 +211,14 @@ def _tested(first: str, second: str, difference: float, se: float, df: float, si
         se,
         difference / se,
         df,
+        # The lower tail twice: 1 minus a distribution function loses small p.
         float(2 * special.stdtr(df, -abs(difference / se))),
         (difference - reach, difference + reach),
         d,
         (float(low), float(high)),
         (d - size.reach, d + size.reach),
         bayes_factor(size.t, size.n, size.df),
+        # Both corrections need all tests of the table; `_corrected` fills them in.
         np.nan,
         np.nan,
     )
@@ -228,6 +235,7 @@ def _corrected(
                 "p_holm": float(by_holm),
                 "p_bonferroni": float(by_bonferroni),
                 "p_games_howell": game,
+                # Not corrected: equivalence is tested for each difference by itself.
                 "p_equivalence": None
                 if bounds is None
                 else equivalence_p(row.difference, row.se, row.df, bounds),
@@ -241,6 +249,7 @@ def _described(names: Sequence[str], groups: Sequence[Floats]) -> tuple[GroupMea
     described = []
     for name, group in zip(names, groups, strict=True):
         n, mean, sd = len(group), float(group.mean()), float(group.std(ddof=1))
+        # Each group by its own SD: variances are not assumed to be equal.
         reach = float(stats.t.ppf(0.975, n - 1)) * sd / n**0.5
         described.append(GroupMean(name, n, mean, sd, (mean - reach, mean + reach)))
     return tuple(described)
@@ -254,8 +263,11 @@ def _welch_anova(groups: Sequence[Floats]) -> WelchAnova | None:
         return None
     means, weights, k = np.array([group.mean() for group in groups]), n / variances, len(groups)
     centre = (weights * means).sum() / weights.sum()
+    # Welch (1951): how uncertain the weights are, which are estimated variances.
     spread = ((1 - weights / weights.sum()) ** 2 / (n - 1)).sum() / (k**2 - 1)
     f = float((weights * (means - centre) ** 2).sum() / (k - 1) / (1 + 2 * (k - 2) * spread))
+    # Estimated from the data, so rarely a whole number.
     df_error = float(1 / (3 * spread))
+    # Negative below F = 1, as omega squared may be.
     size = (k - 1) * (f - 1) / ((k - 1) * (f - 1) + float(n.sum()))
     return WelchAnova(f, k - 1, df_error, float(stats.f.sf(f, k - 1, df_error)), size)

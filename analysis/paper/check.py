@@ -26,6 +26,7 @@ def joint_findings(
     study: PrintedStudy,
 ) -> Iterator[tuple[Literal["impossible"], str, str]]:
     """(kind, about, why) for sets of printed means that no complete balanced data can have."""
+    # In unbalanced data margins weigh cells by how many trials these have.
     if not study.balanced or len(study.mean) < 2 or possible(study, study.mean):
         return
     clash = _smallest_clash(study)
@@ -47,8 +48,10 @@ def possible(study: PrintedStudy, means: Sequence[PrintedMean]) -> bool:
     # Room below the upper end alone: the lower end itself rounds to the figure.
     upper = np.hstack([weights, room])
     lower = np.hstack([-weights, np.zeros_like(room)])
+    # Cell means lie on the scale; the room at most 1, so that the program has a maximum.
     bounds = [study.scale or (None, None)] * len(cells) + [(None, 1.0)]
     solved = linprog(
+        # linprog minimizes, hence minus the room.
         np.r_[np.zeros(len(cells)), -1.0],
         A_ub=np.vstack([upper, lower]),
         b_ub=np.r_[high, -low],
@@ -70,6 +73,7 @@ def _weights(study: PrintedStudy, mean: PrintedMean, cells: list[tuple[str, ...]
 def _smallest_clash(study: PrintedStudy) -> list[PrintedMean]:
     """Leave out means one by one as long as the rest still clashes: what is left all takes part."""
     clash = list(study.mean)
+    # One pass is enough: leaving out more never makes possible means clash.
     for mean in list(study.mean):
         rest = [other for other in clash if other is not mean]
         if len(rest) > 1 and not possible(study, rest):
@@ -83,10 +87,12 @@ def _in_words(study: PrintedStudy, clash: list[PrintedMean]) -> str:
     for factor, levels in study.factors.items():
         parts = [m for level in levels for m in clash if m.at == {factor: level}]
         if len(parts) == len(levels):
+            # Decimals: a sum of rounded figures in binary may miss an end by its last bit.
             low = sum((PrintedInterval.of(m.mean).low for m in parts), Decimal(0))
             high = sum((PrintedInterval.of(m.mean).high for m in parts), Decimal(0))
             names = " + ".join(m.name for m in parts)
             sums.append((len(parts), f"{low} <= {names} < {high}"))
+    # Words of sums would not explain a clash that is mostly about cells.
     if len(sums) * 2 < len(clash) or len(sums) < 2:
         return "these means cannot all hold in complete, balanced data"
     same = len({count for count, _ in sums}) == 1
@@ -101,6 +107,7 @@ def _repairs(study: PrintedStudy, clash: list[PrintedMean]) -> str:
     healed = []
     for mean in clash:
         unit = PrintedInterval.of(mean.mean).unit
+        # One unit in either direction: a misprint or a wrong rounding.
         for step in (-unit, unit):
             changed = mean.model_copy(update={"mean": str(Decimal(mean.mean) + step)})
             others = [changed if other is mean else other for other in study.mean]
@@ -147,6 +154,7 @@ def check_study(study: PrintedStudy) -> Iterator[Finding]:
 def forms(study: PrintedStudy, effect: str) -> dict[str, tuple[int, int]]:
     """The df an effect has as a multivariate and as a univariate test."""
     q, n = study.contrasts(effect), study.participants
+    # Hotelling's test has N - q error df; the univariate one q times N - 1.
     return {"multivariate": (q, n - q), "univariate": (q, q * (n - 1))}
 
 
@@ -163,11 +171,13 @@ def _degrees_of_freedom(study: PrintedStudy) -> Iterator[Finding]:
                 f"{both['univariate']} (univariate), not {test.df}"
             )
             yield Finding(study.name, "contradiction", "df", test.name, why)
+        # With one contrast both forms have the same df and say nothing of the form.
         elif both["multivariate"] != both["univariate"]:
             by_form["multivariate" if test.df == both["multivariate"] else "univariate"].append(test)
     for form, tests in by_form.items():
         if tests:
             yield _form(study, form, tests)
+    # Some tests of each form: a paper usually reports one.
     if all(by_form.values()):
         names = ", ".join(test.name for test in by_form["univariate"])
         yield Finding(study.name, "doubt", "df", names, "univariate among multivariate tests")
@@ -185,6 +195,7 @@ def _p_values(study: PrintedStudy) -> Iterator[Finding]:
     for test in study.test:
         if test.p is None:
             continue
+        # Without printed df, both forms are tried.
         given = [test.df] if test.df else sorted(set(forms(study, test.effect).values()))
         if not any(_p_fits(test, df) for df in given):
             truth = ", ".join(f"{p_value(_p(float(test.f), df))} on {df}" for df in given)
@@ -203,12 +214,14 @@ def _said(p: str) -> str:
 def _p_fits(test: PrintedTest, df: tuple[int, int]) -> bool:
     """Whether some F that rounds to the printed one has a p that rounds (or is cut) to the printed one."""
     f = PrintedInterval.of(test.f)
+    # A larger F has a smaller p, so the ends change places.
     least, greatest = _p(float(f.high), df), _p(float(f.low), df)
     p = test.p or ""
     if p.startswith("<"):
         return least < float(p[1:])
     if p.startswith(">"):
         return greatest > float(p[1:])
+    # An interval, since p may be rounded or cut in print.
     printed = PrintedInterval.of(p)
     return least < float(printed.high) and greatest >= float(printed.low)
 
@@ -218,11 +231,13 @@ def _printed_twice(study: PrintedStudy) -> Iterator[Finding]:
     for one, other in combinations(study.test, 2):
         if one.effect != other.effect or one.f == other.f:
             continue
+        # The one with fewer decimals first.
         coarse, fine = sorted((PrintedInterval.of(one.f), PrintedInterval.of(other.f)), key=lambda r: -r.unit)
         if coarse.low < fine.high and fine.low < coarse.high:
             continue
         about = f"{one.name} and {other.name}"
         right = fine.printed.quantize(coarse.unit)
+        # Cut off, not rounded: a slip rather than another value.
         if coarse.cut(fine.printed) == coarse.printed:
             why = f"{fine.printed} rounds to {right}; {coarse.printed} is cut off, not rounded"
             yield Finding(study.name, "contradiction", "printed twice", about, why)
@@ -234,6 +249,7 @@ def _errors(study: PrintedStudy) -> Iterator[Finding]:
     """Whether an error called SE can be one: participants' means of ratings have a largest possible SD."""
     if study.scale is None:
         return
+    # Only what is called an SE: an SD of this size may be right.
     wrong = [mean for mean in study.mean if mean.error_name == "SE" and _too_large(study, mean)]
     for mean in wrong:
         spread = float(Decimal(mean.error or "0")) * math.sqrt(study.participants)
@@ -251,6 +267,7 @@ def _errors(study: PrintedStudy) -> Iterator[Finding]:
 def _too_large(study: PrintedStudy, mean: PrintedMean) -> bool:
     if mean.error is None:
         return False
+    # From the lower end of the rounding: what is refused is refused for every value.
     least = float(PrintedInterval.of(mean.error).low) * math.sqrt(study.participants)
     return least > _largest_sd(study, float(mean.mean))
 
@@ -276,6 +293,7 @@ def _correlations(study: PrintedStudy) -> Iterator[Finding]:
         # An SE printed as 0 says nothing of a correlation.
         if not first * second:
             continue
+        # Variance of a difference: a2 + b2 - 2 r a b, solved for r.
         r = (first**2 + second**2 - difference**2) / (2 * first * second)
         about = f"{factor} F = {test.f}"
         if abs(r) > 1 + _slack(means, test):
@@ -300,9 +318,11 @@ def _correction(study: PrintedStudy) -> Iterator[Finding]:
     if study.corrected is None:
         return
     m = study.corrected.tests
+    # A test printed twice counts once.
     for test in {t.effect: t for t in study.test}.values():
         df = test.df or forms(study, test.effect)["multivariate"]
         p = _p(float(test.f), df)
+        # Only where the correction would change the verdict.
         if p < 0.05 <= min(1.0, m * p):
             why = (
                 f"p = {p_value(p)}; corrected over {m} tests it would be {p_value(min(1.0, m * p))}, so the "

@@ -87,15 +87,19 @@ def _of_scale(prepared: PlanRows, scale: RatedScale) -> list[CellScore]:
 def _means(prepared: PlanRows, scale: RatedScale) -> Mapping[str, "pd.Series[float]"]:
     """Each participant's mean rating by cell, answers on a reverse-keyed scale turned."""
     rows = prepared.rows
+    # With one scale the column may be missing, or hold no name.
     if len(scales_of(prepared.experiment)) > 1:
         rows = rows[(rows["scale"] == scale.name).to_numpy()]
+    # Cells are named by their levels in declared order, as `ClipSpec.cell` does.
     cells = rows[prepared.experiment.factor_names[0]].astype(str)
     for name in prepared.experiment.factor_names[1:]:
         cells = cells + "/" + rows[name].astype(str)
     answers = rows["response"]
     turned = scale.minimum + scale.maximum - answers if scale.reverse else answers
+    # Answers of "does not apply" are not numbers.
     given = rows.assign(cell=cells, response=turned).dropna(subset=["response"])
     return {
+        # Means of people first, so that each counts once however many exemplars they saw.
         str(cell): of.groupby("participant", observed=True)["response"].mean()
         for cell, of in given.groupby("cell")
     }
@@ -105,6 +109,7 @@ def _references(prepared: PlanRows) -> list[tuple[ClipSpec, str | None]]:
     """A clip of each cell, and the cell of its reference; None where it is its own."""
     experiment = prepared.experiment
     declared = _reference_of(prepared)
+    # Exemplar 1 is as good as any: a reference is declared by levels.
     clips = [ClipSpec(levels, 1) for levels in design.cells(experiment)]
     references = [declared.of(experiment, clip) for clip in clips]
     return [
@@ -115,6 +120,7 @@ def _references(prepared: PlanRows) -> list[tuple[ClipSpec, str | None]]:
 
 def _reference_of(prepared: PlanRows) -> RatingReference:
     reference = clip_rating_of(prepared.experiment).reference
+    # Never reached from a report, which asks first.
     if reference is None:
         raise ValueError("expected a declared reference")
     return reference
@@ -129,6 +135,7 @@ def _scored(
     differential: tuple[float | None, ...] = (None, None, None)
     if reference is not None and reference in means:
         # Of participants who rated both: a difference needs one of each.
+        # P.910 adds the highest answer, so that no impairment gives that answer again.
         both = (mine - means[reference]).dropna().to_numpy(dtype=float) + scale.maximum
         at, _, from_, to = _interval(both)
         differential = (at, from_, to)
@@ -137,6 +144,7 @@ def _scored(
 
 def _interval(values: np.ndarray[Any, Any]) -> tuple[float, float, float, float]:
     """Mean, sd (n - 1), and the ends of the 95% interval of the mean; NaN where undefined."""
+    # One participant has a mean, but no spread.
     if len(values) < 2:
         return (float(values.mean()) if len(values) else np.nan, np.nan, np.nan, np.nan)
     mean, sd = float(values.mean()), float(values.std(ddof=1))
@@ -156,6 +164,7 @@ def with_degradation(contents: Contents, prepared: PlanRows) -> Contents:
         contents,
         parts=(*named, part),
         methods=contents.methods + _methods(every, reference),
+        # `vars` keeps the names of fields as keys of the JSON.
         numbers={**contents.numbers, "degradation": [vars(one) for one in every]},
     )
 
@@ -192,11 +201,13 @@ def extremes(every: tuple[CellScore, ...]) -> tuple[str, ...]:
     """The least and the most impaired cell of each scale, in words: scales of other ranges do not compare."""
     return tuple(
         _extremes_of([one for one in every if one.scale == scale], scale)
+        # In the order of the design, each scale once.
         for scale in dict.fromkeys(one.scale for one in every)
     ) or ("No cell has a rating.",)
 
 
 def _extremes_of(cells: list[CellScore], scale: str) -> str:
+    # NaN cells cannot be compared and are left out.
     told = [one for one in cells if np.isfinite(one.dmos)]
     on_scale = "" if scale == SCALE_NAME else f" on {scale}"
     if not told:

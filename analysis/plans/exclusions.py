@@ -80,6 +80,7 @@ class RuleVerdicts:
         """Apply the chosen rules, one truth value a declared rule."""
         at = [rule for rule, applies in enumerate(chosen) if applies]
         reasons: dict[str, list[str]] = {}
+        # A run may break several rules; all reasons are named.
         for run, why in (*self.by_hand, *(said for rule in at for said in self.runs[rule])):
             reasons.setdefault(run, []).append(why)
         # After the other rules: where one of them excludes a first run, the second counts as the first.
@@ -87,6 +88,7 @@ class RuleVerdicts:
         excluded = tuple(
             ExcludedRun(str(self.people[run]), str(run), tuple(reasons[run]))
             for run in sorted(reasons)
+            # Without any rated trial `people` is empty.
             if run in self.people
         )
         kept = ~self.main["run"].isin(list(reasons)).to_numpy()
@@ -100,6 +102,7 @@ class RuleVerdicts:
             if bad.any():
                 runs = int(self.main["run"][bad].nunique())
                 dropped.append(DroppedTrials(self.rules[rule].rule, n_plays(self.main[bad]), runs))
+            # In declared order: each rule counts what those before it left.
             kept &= ~marked
         # Rules about participants first, then those about trials, in the order of their use.
         order = sorted(at, key=lambda rule: isinstance(self.rules[rule], LeavesOutTrials))
@@ -120,17 +123,21 @@ def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusion
 def judge_rows(experiment: Experiment, ratings: StudyAnswers) -> RuleVerdicts:
     """Set aside everything but main trials, and apply every declared rule to them."""
     rows, aside = _with_run(ratings.rows), list[str]()
+    # A table of others has no kinds: all its rows are main trials.
     kind = rows["kind"] if "kind" in rows.columns else pd.Series("main", index=rows.index)
     main, attention = rows[(kind == "main").to_numpy()], rows[(kind == "attention").to_numpy()]
+    # Whatever is none of the three counts as practice.
     practice = n_plays(rows[~kind.isin(["main", "attention", "check"]).to_numpy()])
     checks = n_plays(rows[(kind == "check").to_numpy()])
     aside += [f"{practice} practice trials"] if practice else []
     aside += [f"{checks} motion checks"] if checks else []
     unrated = np.isnan(main["response"].to_numpy())
+    # An answer, not a missing one, and named apart.
     not_applicable = unrated & _not_applicable(main)
     silent = n_plays(main[unrated & ~not_applicable])
     aside += [f"{silent} presentations without a rating"] if silent else []
     aside += [f"{not_applicable.sum()} answers of 'does not apply'"] if not_applicable.any() else []
+    # Some rules count plays without an answer, so these are kept for them.
     plays, main = main, main[~unrated]
     sources: dict[Source, pd.DataFrame] = {"rows": rows, "plays": plays, "attention": attention}
     lacking = tuple(_lacking(rule, rows, experiment) for rule in experiment.exclusions)
@@ -154,6 +161,7 @@ def judge_rows(experiment: Experiment, ratings: StudyAnswers) -> RuleVerdicts:
 def n_plays(rows: pd.DataFrame) -> int:
     """Number of presentations: one that was rated on several scales has one row per scale."""
     keys = [name for name in ("run", "trial_index", "play") if name in rows.columns]
+    # A table without trial numbers cannot show which rows are of one play.
     if "scale" not in rows.columns or "trial_index" not in keys:
         return len(rows)
     return int((~rows.duplicated(keys)).sum())
@@ -163,6 +171,7 @@ def _not_applicable(rows: pd.DataFrame) -> NDArray[np.bool_]:
     """True where the participant chose that the scale does not apply."""
     if "not_applicable" not in rows.columns:
         return np.zeros(len(rows), dtype=bool)
+    # Text, as tables of others write 1, 1.0, true or yes.
     said = rows["not_applicable"].astype(str).str.casefold()
     return said.isin(["1", "1.0", "true", "yes"]).to_numpy()
 
@@ -177,6 +186,7 @@ def _people(main: pd.DataFrame, rows: pd.DataFrame) -> dict[str, str]:
     pairs = rows[["run", "participant"]].drop_duplicates()
     return (
         {str(run): str(participant) for run, participant in pairs.itertuples(index=False)}
+        # Without a rated trial nobody is counted.
         if len(main)
         else {}
     )
@@ -188,6 +198,7 @@ def _lacking(rule: rules.ExclusionRule, rows: pd.DataFrame, experiment: Experime
     if isinstance(rule, LeavesOutRuns):
         needed = rule.needed
     elif isinstance(rule, ScreensRaters):
+        # Screening compares ratings, which choices are not.
         if not scales_of(experiment):
             return f"{rule.rule}: trials of this kind have no ratings on a scale"
         needed = (*rule.needed, *experiment.factor_names)
@@ -212,11 +223,13 @@ def _screened(
     rule: rules.ScreenByBT500 | rules.ScreenByP913, plays: pd.DataFrame, factors: Sequence[str]
 ) -> tuple[tuple[str, str], ...]:
     """Runs whose ratings are unlike those of all others; a clip's ratings on a scale are averaged."""
+    # What makes two ratings comparable: the same clip on the same scale.
     clip = [name for name in (*factors, "exemplar", "scale") if name in plays.columns]
     rated = plays[np.isfinite(plays["response"].to_numpy())]
     if rated.empty:
         return ()
     means = rated.groupby(["run", *clip], observed=True)["response"].mean()
+    # One row per run, one column per clip; NaN where a run has no rating.
     table = means.unstack(clip)
     screening: Screening = {"rule": rule.rule, "below": getattr(rule, "below", 0.0)}
     reasons = screen_raters(table.to_numpy(dtype=np.float64), screening)
@@ -248,6 +261,7 @@ def _why(rule: rules.ExclusionRule, trials: RunTrials) -> str | None:
 def _by_hand(rows: pd.DataFrame) -> list[tuple[str, str]]:
     if "excluded" not in rows.columns:
         return []
+    # The export repeats the mark on every row of a run.
     chosen = rows[rows["excluded"].to_numpy()].drop_duplicates("run")
     given = chosen["exclusion_reason"] if "exclusion_reason" in chosen.columns else [""] * len(chosen)
     return [
@@ -260,6 +274,7 @@ def _later_runs(
     people: Mapping[str, str], reasons: dict[str, list[str]], first_seen: Mapping[str, str]
 ) -> None:
     """Of several runs of a participant that no rule excludes, keep the first."""
+    # Without a time the name of a run decides, so that the result is the same each time.
     order = sorted((run for run in people if run not in reasons), key=lambda r: (first_seen.get(r, ""), r))
     seen: set[str] = set()
     for run in order:

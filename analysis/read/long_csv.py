@@ -68,10 +68,12 @@ def read_long_table(
     """
     needed = [participant, rating, *within, *between, *covariates, *([trial] if trial else [])]
     refuse_shared_roles(needed)
+    # Columns of an export are read as well: they say which answers count.
     table = read_text_table(path, needed, EXPORT_COLUMNS)
     for name in (participant, *within, *between):
         texts_required(table, name, factor=name != participant)
     values = numbers(table, rating)
+    # Before rows are left out: a typing error must not hide in them.
     refuse_out_of_scale(table, rating, values, scale)
     unusual_numbers(table, rating, values)
     keep = ~np.isnan(values)
@@ -79,16 +81,19 @@ def read_long_table(
         table.decisions.append(f"{(~keep).sum()} rows without a rating excluded ({name_lines(table, ~keep)})")
     if not keep.any():
         raise InputError(f"{path.name}: column '{rating}' has no rating in any row")
+    # With trials named, a repeat is certain; without them it is only suspected.
     if trial is not None:
         keep &= ~_repeats(table, [participant, trial], values, within)
     else:
         _report_copies(table, needed, values)
     measured = {name: numbers(table, name) for name in covariates}
+    # After the ratings: a participant is left out for a covariate as a whole.
     for name, given in measured.items():
         unusual_numbers(table, name, given, IN_COVARIATE)
         keep &= _with_covariate(table, participant, name, given)
     if not keep.any():
         raise InputError(f"{path.name}: no participant has a rating and all covariates")
+    # Last, so that its counts are of rows that would otherwise be used.
     keep = answers_that_count(table, keep, "ratings")
     rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)
     return LongData(rows, path.name, tuple(table.decisions), table.synthetic, table.header)
@@ -99,6 +104,7 @@ def _with_covariate(
 ) -> NDArray[np.bool_]:
     """Rows of participants whose covariate is known; the others are named."""
     people_of_rows = table.columns[participant].to_numpy()
+    # One missing cell leaves out the participant, whose value would be unknown in other rows.
     lacking = list(dict.fromkeys(people_of_rows[np.isnan(given)]))
     if lacking:
         people = f"participant{'s' if len(lacking) > 1 else ''} {', '.join(map(str, lacking))}"
@@ -127,6 +133,7 @@ def _repeats(
 ) -> NDArray[np.bool_]:
     """Rows that repeat a trial already there with the same levels and rating; another rating is refused."""
     frame = table.columns[[*keys, *within]].assign(_rating=values)
+    # The same trial; `same` also has the same levels and rating.
     again = frame.duplicated(keys).to_numpy()
     same = frame.duplicated().to_numpy()
     if (again & ~same).any():
@@ -147,6 +154,7 @@ def _report_copies(table: TextTable, names: list[str], values: NDArray[np.float6
     # The second name is the rating; what is left describes the cell it is of.
     cells = table.columns[[n for n in names if n in table.columns]].drop(columns=names[1])
     counts = cells.groupby(list(cells.columns), observed=True).size()
+    # Several trials per cell are the rule in other designs, so only the exception is named.
     if counts.median() == 1 and counts.max() > 1:
         copies = cells.assign(_rating=values).duplicated().to_numpy()
         more = f", {copies.sum()} of them with the same rating" if copies.any() else ""
@@ -192,6 +200,7 @@ def design_of(
     InputError
         A participant with two values in a column, or as `between_design`.
     """
+    # The usual case, without a pass over all rows.
     if not between and not covariates:
         return no_groups(len(people))
     person, everybody = level_codes(rows[participant], participant)
@@ -199,10 +208,12 @@ def design_of(
     # Assigned from the last row to the first: what stays is the first row of each participant.
     first[person[::-1]] = np.arange(len(person))[::-1]
     position = {name: i for i, name in enumerate(everybody)}
+    # In the order of `people`, which is that of the cell means.
     chosen = np.array([position[one] for one in people], np.int64)
     levels, codes = [], np.zeros((len(people), len(between)), np.int64)
     for k, name in enumerate(between):
         of_rows, own = level_codes(rows[name], name)
+        # Checked for all rows, as only the first row of each participant is used below.
         _refuse_two_values(name, of_rows != of_rows[first][person], rows, everybody, person)
         levels.append(own)
         codes[:, k] = of_rows[first[chosen]]
@@ -210,8 +221,10 @@ def design_of(
     numbers = []
     for name in covariates:
         measured = rows[name].to_numpy(dtype=np.float64)
+        # NaN cannot occur: rows without a covariate were left out.
         _refuse_two_values(name, measured != measured[first][person], rows, everybody, person)
         given = measured[first[chosen]]
+        # The mean over the participants who stay, not over all who were read.
         numbers.append(Covariate(name, given, float(given.mean()) if centred else 0.0, centred))
     return between_design(between, levels, codes, numbers, covariate_by_group)
 

@@ -42,6 +42,7 @@ def contents_of(
     people = prepared.rows["participant"].astype(str).nunique()
     tables = [_shares(fits, variables, experiment.name, prepared.synthetic)]
     if differences:
+        # Results before the raw shares.
         tables.insert(0, differences_table(differences, experiment.name, prepared.synthetic))
     merged = merge(fits)
     if merged is not None:
@@ -62,7 +63,9 @@ def contents_of(
             Part(
                 tuple(tables),
                 (*sentences(fits, variables), *map(difference_sentence, differences)),
+                # A function, so that a report without figures never loads matplotlib.
                 draw=lambda: (draw(fits, variables, prepared.synthetic, people),),
+                # Two numbers a series: a brief report can have them all.
                 brief=(*sentences(fits, variables), *map(difference_sentence, differences)),
             ),
         ),
@@ -87,12 +90,14 @@ def merge(fits: "Sequence[SeriesPlane]") -> PlanesResult | None:
     if not done:
         return None
     return PlanesResult(
+        # "all" is the only condition of a series that is fitted by itself.
         {label: result.pooled["all"] for label, result in done},
         {fit.label: fit.reason for fit in fits if fit.reason},
         tuple(replace(one, condition=label) for label, result in done for one in result.people),
         {label: result.means["all"] for label, result in done},
         sum(result.n_trials for _, result in done),
         (),
+        # Too few people give no population; their series are left out here alone.
         {label: result.population["all"] for label, result in done if result.population},
     )
 
@@ -110,12 +115,14 @@ def sentences(fits: "Sequence[SeriesPlane]", variables: tuple[str, str]) -> tupl
 def _line_in_words(result: PlanesResult, second: str) -> str:
     """Threshold and tilt with their intervals: of the population, or over all trials of fewer people."""
     pooled = result.pooled["all"]
+    # The population generalizes; a pooled line is of these trials only.
     fit, of = (
         (result.population["all"], f"of {result.population['all'].people} people")
         if result.population
         else (pooled, "over all trials")
     )
     low, high = fit.tilt_ci.low, fit.tilt_ci.high
+    # A missing end is open: the likelihood does not bound it on this side.
     known = (low is not None and low > 0) or (high is not None and high < 0)
     verdict = f"so that it depends on {second}" if known else "an interval that includes 0"
     return (
@@ -133,6 +140,7 @@ def _shares(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], name: str
     )
     header = ("Series", *variables, "Trials", "Yes or correct", "Share")
     title = caption("Answers at each stimulus", name, synthetic)
+    # A staircase visits many stimuli; a long table starts folded.
     return Table("threshold-shares", title, header, rows, 1, (), folded=len(rows) > 24)
 
 
@@ -168,10 +176,13 @@ def draw(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], synthetic: b
 
     with mpl.rc_context(STYLE):
         figure = new_figure()
+        # Panels share the first factor, so that lines can be compared across them.
         panels = figure.subplots(1, len(fits), sharey=True, squeeze=False)[0]
         for axes, fit in zip(panels, fits, strict=True):
             x, z, n, k = fit.points
+            # A root, or stimuli with few trials would be too small to see.
             sizes = 12 + 80 * np.sqrt(n / n.max())
+            # The threshold is a value of the first factor, hence upright, along the second.
             axes.scatter(
                 z, x, s=sizes, c=k / n, cmap="cividis", vmin=0, vmax=1, edgecolor="0.4", linewidth=0.4
             )
@@ -183,11 +194,13 @@ def draw(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], synthetic: b
                 known = [
                     (at, low, high) for at, (low, high) in zip(across, ends, strict=True) if low and high
                 ]
+                # A band needs two places.
                 if len(known) > 1:
                     at, low, high = zip(*known, strict=True)
                     axes.fill_between(at, low, high, color="black", alpha=0.15, linewidth=0)
             axes.set_title(fit.label, fontsize=9)
             axes.set_xlabel(variables[1])
+            # Large marks at the ends would be cut.
             axes.margins(x=0.15)
         panels[0].set_ylabel(variables[0])
         note = (

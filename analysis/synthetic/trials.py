@@ -40,11 +40,13 @@ def split_sum(
     total: int, means: NDArray[np.float64], low: int, high: int, rng: np.random.Generator
 ) -> Integers:
     """Draw len(means) whole ratings in [low, high] around `means` that add up to `total`."""
+    # The spread is one of a scale from 1 to 7; others are wider or narrower.
     sd = TRIAL_SD * (high - low) / WIDTH
     ratings = np.clip(np.rint(means + rng.normal(size=len(means)) * sd), low, high).astype(np.int64)
     # Repeated, since near an end of the scale fewer ratings can move than points are missing.
     while (gap := total - int(ratings.sum())) != 0:
         movable = np.flatnonzero(ratings < high if gap > 0 else ratings > low)
+        # At random, or the first ratings of a cell would be systematically different.
         chosen = rng.permutation(movable)[: abs(gap)]
         ratings[chosen] += 1 if gap > 0 else -1
     return ratings
@@ -67,6 +69,7 @@ def rating_rows(
     totals : sequence of Totals
         Of every scale in order, cells in the order of `space`.
     """
+    # As sets: specs may name factors in another order than the space.
     cells = {
         frozenset(zip(space.factors, names, strict=True)): i for i, names in enumerate(product(*space.levels))
     }
@@ -74,7 +77,9 @@ def rating_rows(
     rated = rated_clips(experiment)
     for spec in rated:
         by_cell[cells[frozenset(spec.levels)]].append(spec)
+    # Sorted, so that the same seed gives each key the same number.
     keys = sorted({exemplar_key(experiment, spec) for spec in rated})
+    # Drawn once for all people, since clips differ for everybody.
     own = [{key: rng.normal() * BLINK_SD for key in keys} for _ in totals]
     common = _common(experiment)
     for person in range(len(totals[0].sums)):
@@ -116,6 +121,7 @@ def _cell_answers(
     rng: np.random.Generator,
 ) -> dict[ClipSpec, list[int]]:
     repeats, unit = experiment.blocks.repeats, (steps.high - steps.low) / WIDTH
+    # A clip that is repeated has one offset in all its repeats.
     offsets = unit * np.repeat([own[exemplar_key(experiment, spec)] for spec in specs], repeats)
     # Centered, so that the cell's mean stays what its total says.
     means = total / len(offsets) + offsets - offsets.mean()
@@ -125,6 +131,7 @@ def _cell_answers(
 
 def _common(experiment: Experiment) -> Row:
     return {
+        # The name marks the data, in addition to the column `synthetic`.
         "study": f"synthetic {experiment.name}",
         "experiment": experiment.name,
         "definition_sha256": definition_sha256(experiment),
@@ -153,6 +160,7 @@ def _block_order(experiment: Experiment, rng: np.random.Generator) -> list[Block
         return declared
     if experiment.blocks.order == "random":
         return [declared[i] for i in rng.permutation(len(declared))]
+    # Repeats are whole cycles of the same blocks.
     kinds = len(declared) // experiment.blocks.repeats
     start = int(rng.integers(kinds))
     return [declared[(start + i) % kinds] for i in range(len(declared))]
@@ -170,6 +178,7 @@ def _visit(
     for number, block in enumerate(_block_order(experiment, rng), start=1):
         rated = [spec for spec in block.clips if experiment.trial.rates(experiment, spec)]
         order = rng.permutation(len(rated))
+        # Lognormal: response times are never negative and have a long tail.
         times = np.round(MEDIAN_RT_MS * np.exp(0.35 * rng.normal(size=len(order))), 1)
         for position, rt in zip(order, times.tolist(), strict=True):
             spec = rated[position]
@@ -188,6 +197,7 @@ def _visit(
                 "exemplar": spec.exemplar,
                 "profile_id": exemplar_key(experiment, spec),
                 "stimulus": f"synthetic_{spec.cell.replace('/', '_')}_{spec.exemplar:03d}",
+                # The last answer ends the trial; `scale_rt` has the others.
                 "rt": times_of[-1],
                 "rt_from_first_frame": round(CLIP_MS + times_of[-1], 1),
                 "time_elapsed": round(clock, 1),
@@ -196,6 +206,7 @@ def _visit(
                 yield {
                     **trial,
                     "scale": scale.name,
+                    # Taken from the end: ratings of repeats are in no order.
                     "response": ratings[spec].pop(),
                     "scale_rt": scale_rt if len(answers) > 1 else None,
                 }
@@ -228,11 +239,13 @@ def write_ratings(scales: Sequence[Synthetic], out: Path) -> int:
     """
     first = scales[0]
     header = RATINGS.csv_header(first.experiment.factor_names)
+    # [seed, 1]: another stream than that of the sums, which uses the seed alone.
     rng = np.random.default_rng([first.seed, 1])
     sums = [Totals(made.scale, made.sums) for made in scales]
     count = 0
     with whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as handle:
         writer = csv.writer(handle, lineterminator="\n")
+        # Guarded: a cell that begins like a formula would be run by a spreadsheet.
         writer.writerow(guarded_row(header))
         for row in rating_rows(first.experiment, first.space, sums, rng):
             writer.writerow(guarded_row(row[name] for name in header))

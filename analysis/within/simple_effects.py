@@ -51,16 +51,21 @@ def simple_effect(result: AnovaResult, of: str, at: Mapping[str, str]) -> Effect
     design, x = result.between, result.between.matrix
     groups = {name: design.levels[k].index(at[name]) for k, name in enumerate(design.factors) if name in at}
     z, members = _within_scores(result, of, at)
+    # Between participants: differences of groups, each against the first.
     if of in design.factors:
         size = len(design.levels[design.factors.index(of)])
         rows = np.array([design.row({**groups, of: level}) for level in range(size)])
         rows = rows[1:] - rows[0]
     else:
         rows = design.row(groups)[None]
+    # Orthonormal, so that sums of squares do not depend on which group is the first.
     directions = np.linalg.qr(_toward(x, rows))[0].T
     basis = design.basis
+    # What rounding of the ratings alone can leave in a sum of squares.
     floor = z.size * (8 * np.finfo(float).eps * float(np.abs(result.y).max())) ** 2
+    # The error of the whole model: more df than the places by themselves would give.
     residual, directed = z - basis @ (basis.T @ z), directions @ z
+    # Twice: the first projection leaves rounding errors.
     residual -= basis @ (basis.T @ residual)
     ss_error, ss = above_noise(np.array([np.vdot(residual, residual), np.vdot(directed, directed)]), floor)
     error = error_stratum(residual, members, result.df_error, float(ss_error))
@@ -77,6 +82,7 @@ def _within_scores(result: AnovaResult, of: str, at: Mapping[str, str]) -> tuple
     """Scores (N, q): contrasts of `of` (or the mean) at the levels `at`, over the mean of other factors."""
     values: Floats = result.y
     members: tuple[int, ...] = ()
+    # From the last axis on, as each step removes or moves an axis behind the others.
     for axis in reversed(range(len(result.factors))):
         name = result.factors[axis]
         if name == of:
@@ -86,9 +92,11 @@ def _within_scores(result: AnovaResult, of: str, at: Mapping[str, str]) -> tuple
             values = np.take(values, result.levels[axis].index(at[name]), axis=axis + 1)
         else:
             values = values.mean(axis=axis + 1)
+    # A factor between participants: one score each, their mean at these levels.
     if not members:
         return values.reshape(len(values), 1), ()
     flat = values.reshape(len(values), -1)
+    # The constant first column is left out; centering first keeps small contrasts exact.
     return (flat - flat.mean(axis=1, keepdims=True)) @ orthonormal_basis(flat.shape[1])[:, 1:], members
 
 
@@ -105,6 +113,7 @@ def simple_effects(
         A name that is not an effect, or an effect of one factor or with a covariate.
     """
     multivariate = reports_multivariate(result, planned)
+    # Not all of them: simple effects explain an interaction that was found.
     if interactions is None:
         of_interactions = [effect for effect in result.effects if _is_interaction(result, effect)]
         chosen = [effect for effect in of_interactions if first_p(effect, multivariate) < SIGNIFICANCE]
@@ -129,6 +138,7 @@ def reports_multivariate(result: AnovaResult, planned: bool = True) -> bool:
     multivariate test; else every F is the univariate one with Greenhouse and Geisser's df.
     """
     tests = [effect.multivariate for effect in result.effects]
+    # One rule for all, so that a reader never compares p of different tests.
     return planned and all(test is not None and test.exact for test in tests)
 
 
@@ -150,12 +160,14 @@ def _of_interaction(result: AnovaResult, effect: Effect, multivariate: bool) -> 
     for of in effect.factors:
         others = [name for name in effect.factors if name != of]
         places = [dict(zip(others, at, strict=True)) for at in product(*(levels[o] for o in others))]
+        # So many tests explain nothing, and Holm would leave none.
         if len(places) > MAXIMUM_PLACES:
             continue
         tests = [simple_effect(result, of, at) for at in places]
         p = np.array([first_p(test, multivariate) for test in tests])
         effects += [
             SimpleEffect(effect.effect, of, at, test, float(one), float(adjusted))
+            # Holm over the places of this interaction, for this factor.
             for at, test, one, adjusted in zip(places, tests, p, holm(p), strict=True)
         ]
     return effects

@@ -24,6 +24,7 @@ from stimuli_builder.actor.face import (
 )
 from stimuli_builder.compiled import compiled, compiled_over
 
+# Lengths are in widths of an eye; PIXEL is one of the picture, at the size the actor is drawn.
 IRIS_RADIUS = 0.195
 PUPIL_SHARE = 0.40
 PIXEL = 0.0132
@@ -46,6 +47,7 @@ def lookup(texture, row, column):
 @compiled
 def bell(distance, width):
     ratio = distance / width
+    # Beyond four widths the bell is below one gray level.
     return exp(-ratio * ratio) if ratio * ratio < 16.0 else 0.0
 
 
@@ -57,16 +59,22 @@ def clamp(value):
 @compiled
 def eyeball(u, v, top, low, gaze_u, gaze_v, iris):
     """Gray level of the eyeball behind the opening."""
+    # The iris rests a little above the middle of the opening.
     du, dv = u - gaze_u, v + 0.035 - gaze_v
     radius = hypot(du, dv) / IRIS_RADIUS
+    # The ball darkens to its edges, most of all to the sides.
     colour = 196.0 - 600.0 * abs(u * u * u) - 440.0 * v * v
     if radius < 1.2:
         angle = (atan2(dv, du) / (2 * pi) + 0.5) * (iris.shape[1] - 1)
         inner = lookup(iris, radius * (iris.shape[0] - 1), angle)
+        # An edge one pixel wide instead of a step, for antialiasing.
         inner += (22.0 - inner) * clamp((PUPIL_SHARE - radius) * IRIS_RADIUS / PIXEL + 0.5)
         colour += (inner - colour) * clamp((1.0 - radius) * IRIS_RADIUS / (1.6 * PIXEL) + 0.5)
+    # Shadow of the upper lid, and a fainter one above the lower.
     colour *= 1.0 - 0.42 * bell(v - top, 0.055) - 0.10 * bell(low - v, 0.03)
+    # The reflection of a lamp follows the gaze by less than half.
     colour += 130.0 * bell(hypot(u - 0.045 - 0.4 * gaze_u, v + 0.075 - 0.4 * gaze_v), 0.022)
+    # The moist line along the lower lid.
     return colour + 34.0 * bell(low - v - 0.012, 0.009)
 
 
@@ -77,13 +85,16 @@ def upper_skin(u, v, top, closure, face_row, face_column, face, lid):
     crease = upper_open(u) - CREASE * (0.35 + 0.65 * bend)
     above = lookup(face, face_row, face_column)
     height = max(top - v, 0.0)
+    # Upper lids move a little to the nose when they close.
     nasal = 0.02 * max(closure, 0.0) * bend
     plate = lookup(lid, height / 0.5 * (lid.shape[0] - 1), ((u - nasal) / 1.2 + 0.5) * (lid.shape[1] - 1))
     plate += 26.0 * bend * bell(height - 0.16, 0.13) * max(closure, 0.0)
+    # The crease softens as the lid comes down.
     soft = 0.035 + 0.05 * max(closure, 0.0)
     share = clamp((v - crease) / soft + 0.5) * clamp(bend * 4.0)
     colour = above + (plate - above) * share
     colour -= 44.0 * (1.0 - 0.72 * max(closure, 0.0)) * bell(v - crease, 0.017) * clamp(bend * 3.0)
+    # The shadow under the margin, where lashes begin.
     return colour - 78.0 * bell(height, 0.016) * clamp(bend * 12.0)
 
 
@@ -108,10 +119,12 @@ def lash_shade(u, v, top, low, closure, lashes):
         return 1.0
     shut = max(closure, 0.0)
     reach = (-0.085 + 0.215 * shut) * (0.4 + 0.6 * bend)
+    # While lashes point at the camera they have no length in the picture.
     along = (v - top) / reach if abs(reach) > 0.004 else -1.0
     shade = 1.0
     columns = lashes.shape[1] - 1
     if 0.0 < along < 1.0:
+        # Lashes fan out: those at the sides lean outward.
         root = u - 0.02 * shut * bend + 0.10 * u * along * abs(reach) / 0.1
         dark = lookup(lashes, 0.0, (root / 1.2 + 0.5) * columns)
         shade -= 0.72 * dark * (1.0 - along * along) * clamp(bend * 4.0)
@@ -154,9 +167,12 @@ def draw_eye(
             u = side * (rest_x - centre[0]) / width
             v = (rest_y - centre[1]) / width
             top, low = upper_margin(u, closure), lower_margin(u, closure)
+            # Antialiased at both margins; where the lids meet the opening fades instead of flickering.
             opening = clamp(min(v - top, low - v) / PIXEL + 0.5) * clamp((low - top) / PIXEL)
+            # Beyond the canthi.
             if abs(u) >= 0.5:
                 opening = 0.0
+            # Within the opening either skin serves, as the ball covers it.
             if v < top or (v < 0.5 * (top + low)):
                 colour = upper_skin(u, v, top, closure, rest_y + margin, rest_x + margin, face, lid)
             else:
@@ -190,6 +206,7 @@ def mottle(shape: tuple[int, int], sizes_px: tuple[float, ...], rng: np.random.G
 def face_texture(rng: np.random.Generator) -> Texture:
     """The face at rest without eyes, with a margin of MARGIN_PX on every side."""
     width, height = PICTURE_SIZE[0] + 2 * MARGIN_PX, PICTURE_SIZE[1] + 2 * MARGIN_PX
+    # Coordinates of the picture, so that the margin has negative ones.
     y, x = np.mgrid[:height, :width].astype(np.float32) - MARGIN_PX
     base = 158 - 0.00028 * (x - 256) ** 2 + 0.03 * (y - 196)
     base += 2.2 * mottle((height, width), (0.8,), rng) + 3.5 * mottle((height, width), (3.0, 12.0), rng)
@@ -205,6 +222,7 @@ def face_texture(rng: np.random.Generator) -> Texture:
 
 def _brow(u: Texture, v: Texture, rng: np.random.Generator) -> Texture:
     spine = -0.62 - 0.08 * np.cos(2.6 * (u + 0.1))
+    # Noise of one pixel makes single hairs.
     hairs = mottle((u.shape[0], u.shape[1]), (1.0,), rng) * 0.35 + 1
     shape = np.exp(-(((v - spine) / 0.075) ** 2) - (np.abs(u + 0.02) / 0.62) ** 6)
     return np.asarray(85 * shape * hairs, np.float32)
@@ -215,6 +233,7 @@ def _moles(base: Texture, rng: np.random.Generator) -> Texture:
     for _ in range(45):
         x, y = rng.uniform(0, width), rng.uniform(0, height)
         radius, depth = rng.uniform(0.8, 2.4), rng.uniform(6, 26)
+        # Nine pixels hold all of a mole of at most 2.4 px.
         x0, x1, y0, y1 = int(max(x - 9, 0)), int(x + 9), int(max(y - 9, 0)), int(y + 9)
         ys, xs = np.mgrid[y0 : min(y1, height), x0 : min(x1, width)]
         base[y0:y1, x0:x1] -= depth * np.exp(-((xs - x) ** 2 + (ys - y) ** 2) / (2 * radius**2))
@@ -231,6 +250,7 @@ def lid_texture(rng: np.random.Generator) -> Texture:
 
 def iris_texture(rng: np.random.Generator) -> Texture:
     """Iris in polar form: rows radius 0 to 1, columns angle."""
+    # Three times around, of which the middle is taken: the seam at 360 degrees disappears.
     rays = cv2.GaussianBlur(
         np.tile(rng.standard_normal(IRIS_SHAPE).astype(np.float32), (1, 3)), (0, 0), sigmaX=1.6, sigmaY=9
     )[:, IRIS_SHAPE[1] : 2 * IRIS_SHAPE[1]]
@@ -248,5 +268,6 @@ def lash_texture(rng: np.random.Generator, columns: int = 512) -> Texture:
         places = np.sort(rng.uniform(0.1, 0.9, count)) * columns
         depth = rng.uniform(0.45, 1.0, count)
         at = np.arange(columns)[:, None]
+        # The darkest lash counts where two overlap.
         rows.append((depth * np.exp(-(((at - places) / thickness) ** 2))).max(1))
     return np.asarray(rows, np.float32)

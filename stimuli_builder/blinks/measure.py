@@ -78,6 +78,7 @@ def closed_level(smooth: Array, blinks: Sequence[LabelledBlink], given: float | 
     if given is not None:
         return given
     minima = np.sort([smooth[blink.minimum] for blink in blinks])
+    # Two at least, or all there are.
     count = min(len(minima), max(2, round(DEEPEST_SHARE * len(minima))))
     return float(minima[:count].mean())
 
@@ -93,9 +94,11 @@ def not_below(closed: float, what: str, opening: float) -> InputError:
 def smooth_distance(series: BlinkSeries, options: LabelOptions) -> Array:
     """Filtered distance; frames next to a gap are averaged over what there is, gaps stay NaN."""
     known = np.isfinite(series.distance)
+    # The width is given at 300 fps.
     width = scaled_frames(options.filter_frames, series.fps)
     if known.all():
         return box_filter(series.distance, width)
+    # The same filter over what is known: the share of its window that has values.
     share = box_filter(known.astype(np.float64), width)
     total = box_filter(np.where(known, series.distance, 0.0), width)
     return np.where(known, total / np.maximum(share, 1e-12), np.nan)
@@ -126,6 +129,7 @@ def measure_blinks(
     smooth = smooth_distance(series, options)
     closed = closed_level(smooth, blinks, closed_distance)
     levels = [open_levels(smooth, blink) for blink in blinks]
+    # The line of open levels must lie above the closed one, or closure has no sign.
     fit = [blink for blink, around in zip(blinks, levels, strict=True) if closed < min(around)]
     if not fit and closed_distance is not None:
         widest = max(before for before, _ in levels)
@@ -152,6 +156,7 @@ def _measure(
 ) -> MeasuredBlink:
     fps, least = series.fps, float(smooth[blink.minimum])
     onset_s, minimum_s, end_s = _times(blink, fps)
+    # The open level at the minimum: a lid seldom reopens as far as it was.
     open_distance = float(np.interp(minimum_s, [onset_s, end_s], open_levels(smooth, blink)))
     amplitude = open_distance - least
     # The mean of the deepest quarter is the closed level, so that about half of those blinks go beyond
@@ -159,6 +164,7 @@ def _measure(
     closure = min(1.0, amplitude / (open_distance - closed))
     before, after = _rests(smooth, blink, fps, closed)
     event = blink.event
+    # The fit rests on all frames of the blink, not on the lowest alone.
     if event is not None and event.fit is not None:
         amplitude = event.fit.fallen
     errors_ms = (np.nan,) * 3 if event is None else _errors_ms(event)
@@ -183,6 +189,7 @@ def _measure(
         amplitude=amplitude,
         closure=closure,
         complete=closure >= complete_from,
+        # Closing makes the distance smaller: the speed is the negative of the least slope.
         peak_closing_velocity=float(-velocity[blink.onset : blink.minimum + 1].min()),
         peak_opening_velocity=float(velocity[blink.minimum : blink.end + 1].max()),
         rest_before=before,
@@ -194,6 +201,7 @@ def _measure(
         down_error_ms=errors_ms[0],
         up_error_ms=errors_ms[1],
         duration_error_ms=errors_ms[2],
+        # Moved times are not those of the fit, so its errors do not apply.
         plausible=_plausible(phases_ms, errors_ms[2], by_fit=event is not None and not event.is_moved),
     )
 
@@ -208,6 +216,7 @@ def _errors_ms(event: LidEvent) -> tuple[float, float, float]:
 def _plausible(phases_ms: tuple[float, float, float], error_ms: float, *, by_fit: bool) -> bool:
     """Whether lids move so: phases within `PLAUSIBLE_PHASES_MS`, and by the fit known well enough."""
     inside = all(low <= ms <= high for ms, (low, high) in zip(phases_ms, PLAUSIBLE_PHASES_MS, strict=True))
+    # A comparison with NaN is false: without an error a fitted duration is not believed.
     return inside and (not by_fit or error_ms <= KNOWN_SHARE * phases_ms[2])
 
 
@@ -250,6 +259,7 @@ def _rests(smooth: Array, blink: LabelledBlink, fps: float, closed: float) -> tu
         float(np.nanmedian(after)) if np.isfinite(after).any() else float(smooth[blink.end]),
     ]
     widest = max(levels)
+    # Eyes that rest at the closed level have no opening to compare with.
     if widest <= closed:
         return 0.0, 0.0
     return (widest - levels[0]) / (widest - closed), (widest - levels[1]) / (widest - closed)
@@ -260,9 +270,11 @@ def at_300(values: Array, fps: float, onset: int, minimum: int, end: int) -> tup
 
     Its time is laid so that the minimum falls on a sample and the ends on the last whole ones.
     """
+    # At least one sample for each phase, or a profile would have none.
     before = max(1, round((minimum - onset) * PROFILE_FPS / fps))
     after = max(1, round((end - minimum) * PROFILE_FPS / fps))
     frames = np.concatenate(
+        # The minimum is in both parts and counts once.
         [np.linspace(onset, minimum, before + 1), np.linspace(minimum, end, after + 1)[1:]]
     )
     # Monotone: a common cubic would overshoot at the closed phase and open the lid before it opens.
@@ -286,9 +298,11 @@ def lid_motion_at_300(
     place_mm: Array | None, fps: float, onset: int, minimum: int, end: int, width_frames: float
 ) -> Array | None:
     """Lower lid's motion in one blink at 300 fps, against the line from onset to end; None if unknown."""
+    # A gap inside the blink cannot be filled by the usual motion of lids.
     if place_mm is None or not np.isfinite(place_mm[onset : end + 1]).all():
         return None
     reach = int(np.ceil(width_frames))
+    # The filter needs room on both sides of the blink.
     first = max(0, onset - reach)
     part = place_mm[first : end + 1 + reach]
     # Only the margin for the filter may have gaps: the blink itself is known.

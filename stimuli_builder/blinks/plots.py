@@ -25,6 +25,7 @@ MAX_ROWS = 12
 
 
 def _figure(width: float, height: float) -> "Figure":
+    # Imported here: commands without figures start faster.
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
@@ -39,6 +40,7 @@ def _tidy(axes: "Axes", x_label: str, y_label: str) -> None:
 def save_figure(figure: "Figure", path: Path) -> None:
     """Write a figure as PNG, SVG or PDF by the name's ending; nothing of it depends on the clock."""
     check_figure_name(path)
+    # PNG has no date by itself.
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(path.suffix[1:].lower())
     with whole_file(path) as partial:
         figure.savefig(partial, dpi=150, metadata=metadata)
@@ -58,16 +60,19 @@ def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> 
     """
     duration_s = max(eye.smooth.size / eye.series.fps for eye in eyes)
     row_s = max(SECONDS_A_ROW, duration_s / MAX_ROWS)
+    # A rest of less than a twentieth of a row goes into the last one.
     rows = max(1, int(np.ceil(duration_s / row_s - 0.05)))
     top = max((float(np.nanmax(eye.smooth)) for eye in eyes if np.isfinite(eye.smooth).any()), default=0.0)
     top = top or 1.0  # columns of zeros have no height
     figure = _figure(12, 0.8 + 1.5 * rows)
     grid = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(grid):
+        # The last row ends with the recording, so that nothing is cut off.
         stop_s = duration_s if row == rows - 1 else (row + 1) * row_s
         for position, eye in enumerate(eyes):
             _series_row(axes, eye, row * row_s, stop_s, position, rejected, top)
         axes.set_ylim(-0.03 * top, 1.12 * top)
+        # Rows have one scale; a recording of one row ends where it ends.
         axes.set_xlim(row * row_s, stop_s if rows == 1 else max(stop_s, (row + 1) * row_s))
         axes.spines[["top", "right"]].set_visible(False)
     unit = "px" if eyes[0].series.is_px else "as recorded"
@@ -88,19 +93,23 @@ def _series_row(
     top: float,
 ) -> None:
     """One row of one eye; `top` is the greatest distance of all eyes, so that each is seen whole."""
+    # More than four columns share colors; their legends differ.
     colour = (BLUE, AMBER, GREEN, GREY)[position % 4]
     fps = eye.series.fps
     first, last = int(start_s * fps), min(int(np.ceil(stop_s * fps)) + 1, eye.smooth.size)
+    # More points than a row has pixels slow the drawing down and change nothing.
     step = max(1, (last - first) // 6000)
     frames = np.arange(first, last, step)
     axes.plot(frames / fps, eye.smooth[first:last:step], color=colour, lw=0.9, label=eye.series.column)
     for blink in eye.blinks:
+        # A blink on the border of two rows is drawn in both.
         if blink.end_s <= start_s or blink.onset_s >= stop_s:
             continue
         out = (eye.series.column, blink.number) in rejected
         axes.axvspan(blink.onset_s, blink.end_s, color=GREY if out else colour, alpha=0.13, lw=0)
         for frame, marker in ((blink.onset_frame, ">"), (blink.minimum_frame, "v"), (blink.end_frame, "<")):
             axes.plot(frame / fps, eye.smooth[frame], marker, ms=3.5, color=GREY if out else RED)
+        # Rejected blinks keep their number, since reviews refer to it.
         label = f"({blink.number})" if out else f"{blink.number}"
         axes.annotate(
             label,
@@ -144,6 +153,7 @@ def aligned_figure(groups: dict[str, Sequence[BlinkProfile]]) -> "Figure":
         blinks.legend(frameon=False, loc="lower right")
         _tidy(blinks, "time from the minimum (ms)", "opening (1 = open)")
         lengths = np.array([profile.duration_frames_30fps for profile in profiles])
+        # Bins of one frame, as in the figure of the paper.
         durations.hist(lengths, bins=np.arange(0, int(lengths.max()) + 2), color=BLUE, rwidth=0.9)
         _tidy(durations, f"duration (frames of {DURATION_BIN_MS:.1f} ms)", "blinks")
         amplitudes.hist(
@@ -151,6 +161,7 @@ def aligned_figure(groups: dict[str, Sequence[BlinkProfile]]) -> "Figure":
         )
         _tidy(amplitudes, "greatest closure", "blinks")
         for histogram in (durations, amplitudes):
+            # Counts: half a blink on the axis would look odd.
             histogram.yaxis.get_major_locator().set_params(integer=True)
     return figure
 
@@ -184,6 +195,7 @@ def _normalised_curves(axes: "Axes", model: BlinkModel, training: Sequence[Blink
         middle = profile.minimum_index
         down = phase_spline(profile.closure[profile.onset_index : middle + 1], model.down_frames)
         up = phase_spline(profile.closure[middle : profile.end_index + 1], model.up_frames)
+        # Both phases hold the minimum; it is drawn once.
         axes.plot(1 - np.concatenate([down, up[1:]]), color=BLUE, lw=0.9, alpha=0.6)
     mean, _, _ = model.normalised_forms(np.zeros(model.coefficient_sd.size))
     axes.plot(1 - mean[0], color=RED, lw=2, label="mean of the model")
@@ -199,9 +211,11 @@ def _component_curves(axes: "Axes", model: BlinkModel) -> None:
     for index, share in enumerate(model.explained):
         one = np.zeros(model.coefficient_sd.size)
         mean, _, _ = model.normalised_forms(one)
+        # One standard deviation of each coefficient, the others at their mean.
         one[index] = model.coefficient_sd[index]
         form, down_scale, up_scale = model.normalised_forms(one)
         _, down_mean, up_mean = model.normalised_forms(np.zeros_like(one))
+        # A component changes the lengths of the phases, too; a curve on a common length hides it.
         timing = f"down {down_scale - down_mean:+.2f}, up {up_scale - up_mean:+.2f}"
         label = f"{index + 1}: {share:.1%} ({timing})"
         axes.plot(mean[0] - form[0], color=colours[index % len(colours)], lw=1.4, label=label)
@@ -216,6 +230,7 @@ def profiles_figure(profiles: Sequence[BlinkProfile], title: str) -> "Figure":
     """Figure 8: a few made profiles over one another, named."""
     figure = _figure(7, 4)
     axes = figure.subplots()
+    # Colors repeat where there are more than six profiles.
     for profile, colour in zip(
         profiles, (BLUE, GREEN, RED, "#6b46c1", "black", AMBER) * len(profiles), strict=False
     ):

@@ -60,6 +60,7 @@ BLINK_COLUMNS = {
     "accepted": "false if a review rejected the blink",
     "reason": "reason given in the review",
 }
+# One frame at 30 fps, in which the paper gives durations.
 DURATION_BIN_MS = 1000 / 30
 AMPLITUDE_BINS = 10
 
@@ -84,6 +85,7 @@ def blinks_frame(
     pairs: Sequence[tuple[MeasuredBlink, MeasuredBlink]] = (),
 ) -> pd.DataFrame:
     """Return the blinks table, columns as in `BLINK_COLUMNS`; `pairs` are the blinks of both eyes."""
+    # Both directions: each eye's row names the other's.
     partners = {(one.column, one.number): other for pair in pairs for one, other in (pair, pair[::-1])}
     rows = []
     for blink in blinks:
@@ -93,11 +95,13 @@ def blinks_frame(
             "partner": None if other is None else other.number,
             "partner_lag_ms": None if other is None else (blink.onset_s - other.onset_s) * 1000,
             "partner_closure": None if other is None else blink.closure - other.closure,
+            # Without a review a blink counts.
             "accepted": review is None or review.decision == "accept",
             "reason": "" if review is None else review.reason,
         }
         rows.append(row)
     frame = pd.DataFrame(rows, columns=list(BLINK_COLUMNS))
+    # Rounded below, so that other computers write the same digits.
     numbers = [field.name for field in fields(MeasuredBlink) if field.type in (float, "float")]
     numbers += ["partner_lag_ms", "partner_closure"]
     # Nullable, so that numbers stay whole where a partner is missing.
@@ -130,6 +134,7 @@ def aligned(profiles: Sequence[BlinkProfile]) -> tuple[Array, Array]:
         Time from the minimum.
     closures : (profiles, n) array
     """
+    # The longest phases decide the width; shorter blinks are held at their ends.
     before = max(profile.minimum_index for profile in profiles)
     after = max(profile.closure.size - profile.minimum_index for profile in profiles)
     rows = [
@@ -148,6 +153,7 @@ def summarise(eye_blinks: EyeBlinks, frame: pd.DataFrame, profiles: Sequence[Bli
     series = eye_blinks.series
     rows = frame[frame["accepted"] & (frame["column"] == series.column)]
     minutes = eye_blinks.seconds / 60
+    # Rates count every blink; only phases and closure need plausible ones.
     believed = rows[rows["plausible"]]
     durations, closures = believed["duration_ms"].to_numpy(), believed["closure"].to_numpy()
     return {
@@ -200,6 +206,7 @@ def duration_histogram(durations_ms: Array) -> dict[str, list[float] | list[int]
     """Count durations in bins of one frame at 30 fps, as in the paper's Figure 6c."""
     if not durations_ms.size:
         return {"edges_ms": [], "counts": []}
+    # A duration exactly on an edge belongs to the bin above it.
     last = int(np.ceil((durations_ms.max() + 1e-9) / DURATION_BIN_MS))
     edges = np.arange(last + 1) * DURATION_BIN_MS
     counts, _ = np.histogram(durations_ms, bins=edges)
@@ -216,6 +223,7 @@ def amplitude_histogram(closures: Array) -> dict[str, list[float] | list[int]]:
 def _spread(values: Array) -> dict[str, float]:
     if not values.size:
         return {}
+    # One blink has no spread.
     sd = float(values.std(ddof=1)) if values.size > 1 else 0.0
     spread = {"mean": values.mean(), "sd": sd, "median": np.median(values), "min": values.min()}
     return {name: round(float(value), 4) for name, value in (spread | {"max": values.max()}).items()}
@@ -227,6 +235,7 @@ def _mean_blink(profiles: Sequence[BlinkProfile]) -> dict[str, list[float]]:
     time_ms, closures = aligned(profiles)
     return {
         "from_minimum_ms": np.round(time_ms, 3).tolist(),
+        # Five decimals of a closure are far below what a camera resolves.
         "closure": np.round(closures.mean(axis=0), 5).tolist(),
     }
 
@@ -272,12 +281,14 @@ def shortened(name: str, longest: int = MAX_NAME) -> str:
     """A name of at most `longest` letters, an ellipsis for its middle: both ends distinguish columns."""
     if len(name) <= longest:
         return name
+    # One letter less for the ellipsis.
     end = (longest - 1) // 2
     return f"{name[: longest - 1 - end]}…{name[-end:]}"
 
 
 def _column_lines(row: dict[str, Any], *, closed_given: bool) -> list[str]:
     lines = []
+    # With a given level the blinks need not show it.
     if 0 < row["blinks"] < FEW_BLINKS and not closed_given:
         lines.append(
             "there are too few blinks to decide which are complete: their own deepest level was used as "
@@ -296,6 +307,7 @@ def _column_lines(row: dict[str, Any], *, closed_given: bool) -> list[str]:
 
 def print_written(blinks: int, written: Iterable[Path | None]) -> None:
     """Print how many blinks there are in all columns, and the files that were written."""
+    # None where a file was not wanted.
     paths = ", ".join(str(path) for path in written if path is not None)
     Console(markup=False, highlight=False).print(f"{counted(blinks, 'blink')}; wrote {paths}")
 

@@ -71,11 +71,13 @@ class BuildState:
         if built is None:
             return False
         path = self.folder / built.file
+        # Size first: it answers without reading the file.
         return path.is_file() and path.stat().st_size == built.bytes and file_sha256(path) == built.sha256
 
     @contextmanager
     def recording(self) -> Iterator[None]:
         """Keep `add`ed clips on disk at once."""
+        # Appended: lines of an interrupted build stay valid.
         with (self.folder / STATE_NAME).open("a", encoding="utf-8") as self._stream:
             yield
         self._stream = None
@@ -85,6 +87,7 @@ class BuildState:
         self._built[built.input_hash] = built
         if self._stream is not None:
             self._stream.write(json.dumps(asdict(built)) + "\n")
+            # At once, or an interruption would lose clips that are finished.
             self._stream.flush()
 
     def finish(self) -> None:
@@ -108,6 +111,7 @@ def _state_lines(path: Path) -> Iterator[Built]:
 
 def former_manifest(experiment: Experiment, folder: Path) -> Manifest | None:
     """The manifest of the build before, None where there is none; InputError where it is another study's."""
+    # Before anything is rendered, which may take hours.
     if folder.exists() and not folder.is_dir():
         raise InputError(
             f"{folder}: expected a folder for the clips, but this is a file; choose another name"
@@ -128,6 +132,7 @@ def stale(former: Manifest | None, manifest: Manifest) -> tuple[str, ...]:
     if former is None:
         return ()
     current = {clip.file for clip in manifest.files}
+    # Files of a build are named by their hash; a file by another name is not ours to delete.
     made = {clip.file for clip in former.files if clip.file == f"{clip.sha256}.mp4"}
     return tuple(sorted(made - current))
 
@@ -163,6 +168,7 @@ def program_version() -> str:
     """The installed version of the program."""
     try:
         return version("palpebra")
+    # Run from a source tree, without an installation.
     except PackageNotFoundError:
         return "not installed"
 
@@ -177,6 +183,7 @@ def assemble(
     """The manifest of a finished build, clips in design order."""
     seed = options.seed_for(experiment)
     clips = tuple(_clip(clip, state, seed) for clip in planned)
+    # Rounded, since sizes differ in the last bits of a float.
     ocular = {
         round(c.geometry.inter_ocular_mm * c.geometry.px_per_mm_at(c.settings.width_px), 4) for c in planned
     }
@@ -185,6 +192,7 @@ def assemble(
         definition_sha256=definition_hash,
         program_version=program_version(),
         seed=seed,
+        # None where characters or sizes differ.
         inter_ocular_px=ocular.pop() if len(ocular) == 1 else None,
         notes=(*CONVENTIONS, *repetition_notes(planned)),
         clips=clips,
@@ -204,10 +212,12 @@ def manifest_text(manifest: Manifest) -> str:
     """JSON with one line a clip; equal manifests give equal text."""
     content = manifest.model_dump(mode="json")
     listed = {name: content.pop(name) for name in ("clips", "checks")}
+    # A study without checks keeps the manifest that it had before checks existed.
     if not listed["checks"]:
         del listed["checks"], content["checks_seed"]
     head = json.dumps(content, indent=1, ensure_ascii=False)
     lists = (f' "{name}": [\n  {_lines(clips)}\n ]' for name, clips in listed.items())
+    # The head without its closing brace, which comes after the lists.
     return f"{head[:-2]},\n" + ",\n".join(lists) + "\n}\n"
 
 
@@ -232,6 +242,7 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
         width_mm=round(settings.width_px / clip.geometry.px_per_mm_at(settings.width_px), 4),
         profile=curve.profile_id,
         profile_repeated=clip.repeated,
+        # A performance has many blinks and no single duration.
         duration_frames=None if settings.performance else curve.duration_frames,
         onset_frame=clip_onset_frame(curve, settings),
         closure=clip_samples(curve.closure),
@@ -241,14 +252,17 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
         blinks_s=curve.blinks_s,
         inputs={
             RENDER_KEY: job.input_hash,
+            # The name only: a path would depend on the computer.
             "character": Path(settings.character).name,
             "character_sha256": job.look.fingerprint,
             **_shown(settings),
             "amplitude": settings.amplitude,
+            # Inputs are texts, for one column each in an export.
             "motion_blur": str(settings.motion_blur).lower(),
             "lower_lid": settings.lower_lid,
             **moved_mm(clip),
             **job.look.movement.inputs(),
+            # Without motion the key is left out, as in manifests from before it existed.
             **({"life": repr(settings.life), "life_seed": str(job.life_seed)} if settings.life else {}),
             "eyes": settings.eyes,
             **clip.lower_held,
@@ -267,6 +281,7 @@ def moved_mm(clip: PlannedClip) -> dict[str, str]:
     signals = {"lift": curve.lower_vertical_mm, "slide": curve.lower_horizontal_mm}
     for name, signal in signals.items():
         if signal is not None:
+            # The value farthest from rest, with its sign.
             said[f"lower_lid_{name}_mm"] = f"{float(signal[np.argmax(np.abs(signal))]):.3f}"
     parts = dict(clip.geometry.moved_mm) | clip.job.look.movement.declared
     for name, moved in parts.items():
@@ -283,6 +298,7 @@ def clip_onset_frame(curve: ClipCurve, settings: RenderSettings) -> int | None:
     """Where the blink begins, or the first of a performance; None where nobody blinks."""
     if settings.performance and not curve.blinks_s:
         return None
+    # Rounded down: the frame that shows the onset.
     return int(curve.onset_sample / samples_per_frame(settings.fps))
 
 

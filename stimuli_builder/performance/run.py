@@ -54,12 +54,14 @@ def speech_in_subtitles(path: Path, speaker: str | None = None) -> tuple[list[Sp
     if speaker is not None and speaker not in voices:
         spoken = f"; voices: {', '.join(voices)}" if voices else "; the file names no voices"
         raise InputError(f"{path}: there is no speaker '{speaker}'{did_you_mean(speaker, voices)}{spoken}")
+    # Of all voices: the others' last words belong to the dialogue that this person listens to.
     length_s = max((_seconds(caption.end) for caption in captions), default=0.0)
     own = [caption for caption in captions if speaker is None or caption.voice == speaker]
     return join_speech([_stretch(path, caption) for caption in own]), length_s
 
 
 def _captions(path: Path) -> list[Caption]:
+    # SubRip differs by its comma before the milliseconds.
     read = webvtt.read if path.suffix.lower() == ".vtt" else webvtt.from_srt
     try:
         captions = list(read(str(path)).captions)
@@ -83,6 +85,7 @@ def _stretch(path: Path, caption: Caption) -> Speech:
 
 def _seconds(stamp: str) -> float:
     seconds = 0.0
+    # Hours may be missing; each part is 60 times the next.
     for part in stamp.replace(",", ".").split(":"):
         seconds = seconds * 60.0 + float(part)
     return seconds
@@ -92,6 +95,7 @@ def _seconds(stamp: str) -> float:
 
 RATE_HZ = 16_000
 FRAME_MS = 30
+# WebRTC takes 0 to 3; higher means that less is called speech.
 AGGRESSIVENESS = 2
 HANGOVER_FRAMES = 4
 """A gap this short within speech does not end it: the detector flickers on soft sounds."""
@@ -118,6 +122,7 @@ def read_audio(path: Path) -> tuple[bytes, float]:
             frames = [
                 part.to_ndarray() for frame in container.decode(audio=0) for part in resampler.resample(frame)
             ]
+            # None empties the resampler, which holds back the last samples.
             frames += [part.to_ndarray() for part in resampler.resample(None)]
     except (av.FFmpegError, OSError) as error:
         reason = error.strerror or "it cannot be decoded"  # without the number, which says nothing to people
@@ -128,6 +133,7 @@ def read_audio(path: Path) -> tuple[bytes, float]:
     samples = np.concatenate([frame.ravel() for frame in frames]) if frames else np.zeros(0, dtype=np.int16)
     if not samples.size:
         raise InputError(f"{path}: expected sound, but the file has no samples")
+    # Little-endian, whatever the computer, as the detector expects.
     return samples.astype("<i2").tobytes(), samples.size / RATE_HZ
 
 
@@ -138,14 +144,17 @@ def speech_in_audio(path: Path) -> tuple[list[Speech], float]:
 
     samples, duration_s = read_audio(path)
     detector = webrtcvad.Vad(AGGRESSIVENESS)
+    # In bytes: two for each sample.
     size = RATE_HZ * FRAME_MS // 1000 * 2
     step_s = FRAME_MS / 1000
     spoken = [
         Speech(start / size * step_s, (start / size + 1) * step_s)
+        # A last frame that is not full is left out: the detector takes whole frames only.
         for start in range(0, len(samples) - size + 1, size)
         if detector.is_speech(samples[start : start + size], RATE_HZ)
     ]
     stretches = join_speech(spoken, HANGOVER_FRAMES * step_s)
+    # After the gaps are closed: several short sounds in a row are speech.
     return join_speech([one for one in stretches if one.end_s - one.start_s > SPEECH_MIN_S]), duration_s
 
 
@@ -182,6 +191,7 @@ def write_performance(job: PerformanceJob) -> None:
     """Write the lid curves of a whole performance; see `stimuli performance --help`."""
     state = _checked(job)
     stretches, length_s = _speech(job)
+    # A duration that is given wins over the length of the source.
     duration_s = job.duration_s or length_s
     if duration_s <= 0:
         raise InputError("expected a recording, subtitles, or --duration in seconds; got none")
@@ -198,14 +208,17 @@ def write_performance(job: PerformanceJob) -> None:
         job.fps,
         seed=job.seed if job.speaker is None else seed_of_speaker(job.seed, job.speaker),
         state=state,
+        # Given onsets are every blink: those of speech and gaze would come on top.
         events=[Event("blink", one) for one in onsets] if onsets else [*speech_events(stretches), *shifts],
         changes=speech_states(stretches, state) if stretches else (),
         parameters=parameters,
+        # A clip that stops in mid-blink cannot be looped or joined.
         ends_open=True,
     )
     curve = animation_curve(done)
     if gaze is not None:
         curve = looking(curve, gaze, parameters.gaze_closure_per_deg)
+    # The text is made before the file is opened, so an error leaves no empty file.
     text = write_curve(job.format_name, curve, job.target)
     with whole_text(job.out) as stream:
         stream.write(text)
@@ -229,6 +242,7 @@ def _parameters(job: PerformanceJob, state: StateName) -> Parameters:
     if job.lively is not None:
         # Half to twice the published rate in every state: most people's means lie between.
         laws = {
+            # 0 doubles the mean interval, 0.5 leaves it, 1 halves it.
             one: law.with_mean(law.mean * 2 ** (1 - 2 * job.lively))
             for one, law in parameters.intervals.items()
         }
@@ -236,6 +250,7 @@ def _parameters(job: PerformanceJob, state: StateName) -> Parameters:
     if job.complete is not None:
         parameters = parameters.with_profile(complete_share=job.complete, long_share=0.0)
     if job.blinks_at is not None:
+        # Longer than any performance: nothing but the given blinks.
         never = Law("fixed", 10 * MAX_SECONDS)
         parameters = parameters.with_intervals(dict.fromkeys(parameters.intervals, never))
         parameters = parameters.with_profile(double_share=0.0)
@@ -255,6 +270,7 @@ def _onsets(path: Path, duration_s: float) -> list[float]:
         raise InputError(f"{path}: {name}: expected seconds: {error}") from error
     if not onsets or not all(0 <= one <= duration_s for one in onsets):  # NaN is in no range
         raise InputError(f"{path}: expected times from 0 to {duration_s:g} s; fix them or --duration")
+    # The engine begins no blink sooner than this after another.
     least = default_parameters().least_interval_s
     for earlier, later in pairwise(onsets):
         if later - earlier < least:
@@ -295,12 +311,14 @@ def read_gaze(path: Path, duration_s: float) -> GazeTrack:
         values = np.array([[float(row[name]) for name in ("time_s", *given)] for _, row in table.rows])
     except ValueError as error:
         raise InputError(f"{path}: expected numbers: {error}") from error
+    # Finite before rising: a comparison with NaN is false, too.
     if not len(values) or not np.isfinite(values).all() or not (np.diff(values[:, 0]) > 0).all():
         raise InputError(f"{path}: expected rising times and finite angles in every row")
     if values[0, 0] > duration_s or values[-1, 0] < 0:
         raise InputError(f"{path}: expected times from 0 to {duration_s:g} s; correct them or --duration")
     if np.abs(values[:, 1:]).max() > GAZE_DEG_MAX:
         raise InputError(f"{path}: expected angles up to {GAZE_DEG_MAX:g} degrees; eyes turn no further")
+    # A direction that is not given is 0, straight ahead.
     deg = np.zeros((len(values), 2))
     for column, name in enumerate(("right_deg", "up_deg")):
         if name in given:
@@ -311,11 +329,13 @@ def read_gaze(path: Path, duration_s: float) -> GazeTrack:
 def gaze_shifts(gaze: GazeTrack) -> list[Event]:
     """The saccades of a track: where they begin, and how far each leads."""
     steps = np.hypot(*np.diff(gaze.deg, axis=0).T)
+    # False at both ends, so that every saccade begins and ends.
     fast = np.r_[False, steps / np.diff(gaze.time_s) > SHIFT_DEG_PER_S, False]
     begins, ends = (np.flatnonzero(fast[1:] & ~fast[:-1]), np.flatnonzero(~fast[1:] & fast[:-1]))
     return [
         Event("gaze_shift", float(gaze.time_s[begin]), float(np.hypot(*(gaze.deg[end] - gaze.deg[begin]))))
         for begin, end in zip(begins, ends, strict=True)
+        # Times before 0 only lead in to the direction at the start.
         if gaze.time_s[begin] >= 0
     ]
 
@@ -327,7 +347,9 @@ def looking(curve: AnimationCurve, gaze: GazeTrack, closure_per_deg: float) -> A
     """
     at = np.arange(curve.left.size) / curve.fps
     deg = np.stack([np.interp(at, gaze.time_s, column) for column in gaze.deg.T], axis=1)
+    # Lids follow the gaze down only.
     covered = np.clip(-closure_per_deg * deg[:, 1], 0.0, GAZE_CLOSURE_MAX)
+    # What the gaze has covered is not there for the blink to close.
     left, right = (np.round(covered + (1 - covered) * lid, 6) for lid in (curve.left, curve.right))
     return replace(curve, left=left, right=right, gaze_deg=np.round(deg, 4))
 
@@ -355,6 +377,7 @@ def _checked(job: PerformanceJob) -> StateName:
     for option, share in (("--complete", job.complete), ("--lively", job.lively)):
         if share is not None and not 0 <= share <= 1:
             raise InputError(f"expected {option} from 0 to 1, got {share:g}")
+    # Both change intervals, which given blinks do not have.
     if job.blinks_at is not None and (job.rate is not None or job.lively is not None):
         raise InputError("--blinks-at gives every blink; remove --rate and --lively")
     if job.gaze is not None and job.blinks_at is not None:

@@ -76,6 +76,7 @@ def cross_validate(
         Called after each fold.
     """
     frames = sorted(points)
+    # No fold without a frame to leave out.
     folds = min(folds, len(frames))
     results = []
     for fold in range(folds):
@@ -83,6 +84,7 @@ def cross_validate(
         out = [frame for index, frame in enumerate(frames) if index % folds == fold]
         kept = [frame for frame in frames if frame not in out]
         labels = {frame: points[frame] for frame in kept}
+        # Within the fold: refining before would let the left-out frames shape the labels.
         if refine:
             labels = refined_labels(pictures, labels, markers, options)
         model = train([pictures[f] for f in kept], np.array([labels[f] for f in kept]), markers, options)
@@ -98,11 +100,15 @@ def _held_out(
     model: CoupledModel, finder: Finder, frame: int, fold: int, picture: Picture, label: Points
 ) -> HeldOut:
     small = reduce_picture(picture, model.reduction)
+    # A typical place, known from the training frames alone.
     middle = np.median(model.poses, axis=0)
+    # A track searches both ways; the better one counts.
     fits = [fit for fit in (finder.anywhere(small), finder.near(small, middle)) if fit is not None]
     if not fits:
         return HeldOut(frame, fold, None, None, None)
+    # By the worse eye: a fit of one eye only is not found.
     fit: Fit = min(fits, key=lambda restored: float(restored.residuals.max()))
+    # Back from the reduced picture to pixels of the video.
     restored = restored_points(fit.vertices[: len(label)].astype(np.float64), model.reduction)
     errors = inter_eyelid_distances(restored, model.markers) - inter_eyelid_distances(label, model.markers)
     away = np.hypot(*(restored - label).T)
@@ -119,6 +125,7 @@ def residual_limits(results: Sequence[HeldOut], eyes: int) -> Values:
     if not seen:
         return np.full(eyes, np.inf)
     residuals = np.array(seen)
+    # The larger of two: few labeled frames give an uncertain 90th percentile.
     return np.maximum(3 * np.median(residuals, axis=0), 1.5 * np.percentile(residuals, 90, axis=0))
 
 
@@ -133,6 +140,7 @@ def refined_labels(
 
     A person's labels scatter by a pixel; what many frames agree on does not.
     """
+    # One mode cannot follow the scatter of single labels.
     plain = replace(options, shape_variance=0.0, fewest_shape_modes=1)
     frames = sorted(points)
     refined = {frame: points[frame] for frame in frames}
@@ -167,17 +175,20 @@ def compare_with_truth(track: Path, truth: Path) -> TruthReport:
     errors: list[tuple[float, float, float, bool]] = []
     lost = again = 0
     names, gaps = point_columns(2), distance_columns(2)
+    # `zip_longest`, so that a shorter table is noticed.
     for row, true in zip_longest(track_rows(track), track_rows(truth)):
         if row is None or true is None or row["frame"] != true["frame"]:
             raise InputError(
                 f"{track}: its frames differ from those of {truth}; compare a track with its own ground truth"
             )
+        # Swapped arguments would silently measure the truth against the track.
         if "status" in true and "status" not in row:
             raise InputError(
                 f"expected a track (with a column 'status') and then its truth, got {track} and {truth}: "
                 "swap them"
             )
         again += row.get("status") == "reinitialised"
+        # A lost frame has no points; it is counted, not measured.
         if row.get("status") == "lost":
             lost += 1
             continue
@@ -197,6 +208,7 @@ def _truth_report(errors: Values, lost: int, again: int) -> TruthReport:
         reinitialised=again,
         rms_px=float(np.sqrt((errors[:, 0] ** 2).mean())),
         p95_px=float(np.percentile(errors[:, 0], 95)),
+        # Blinks apart: they are few frames, but those that matter.
         blink_p95_px=float(np.percentile(errors[blinking, 0], 95)) if blinking.any() else None,
         distance_bias_px=float(errors[:, 1:3].mean()),
         distance_sd_px=float(errors[:, 1:3].std()),

@@ -14,6 +14,7 @@ from stimuli_builder.tracking.shapes import EYE_POINTS, LidMarkers, Points, defa
 
 # Whether the points of a label file can be the lids of eyes.
 
+# As parts of the eye's width.
 ORDER_TOLERANCE = 0.06
 CROSSING_TOLERANCE = 0.12
 
@@ -36,6 +37,7 @@ def check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) ->
     InputError
         One line that names the first wrong point.
     """
+    # Pixel centers are whole numbers, so a picture reaches half a pixel beyond them.
     outside = np.flatnonzero(((points < -0.5) | (points > np.array(size) - 0.5)).any(1))
     if len(outside):
         x, y = points[outside[0]]
@@ -46,6 +48,7 @@ def check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) ->
     centres = [
         points[start : start + EYE_POINTS].mean(0)[0] for start in range(0, eyes * EYE_POINTS, EYE_POINTS)
     ]
+    # By the middle of each eye: single points of a tilted face may overlap.
     if centres != sorted(centres):
         raise InputError(f"{where}: the eyes are swapped; points 1 to 9 belong to the image-left eye")
     for eye in range(eyes):
@@ -54,13 +57,16 @@ def check_frame(where: str, points: Points, eyes: int, size: tuple[int, int]) ->
 
 def _check_eye(where: str, eye: Points, first: int) -> None:
     """Refuse an eye whose outline crosses itself by more than the wobble of a closed eye's labels."""
+    # Before the axis below, which such canthi do not define.
     if np.hypot(*(eye[5] - eye[0])) < 4:
         raise InputError(
             f"{where}: canthi {first + 1} and {first + 6} are less than 4 px apart; label a larger eye"
         )
     along, down, width = eye_axis(eye)
     x, y = (eye - eye[0]) @ along / width, (eye - eye[0]) @ down / width
+    # The image-right eye is mirrored: its points run from right to left.
     sign = 1.0 if x[5] > 0 else -1.0
+    # The canthi belong to both lids.
     upper, lower = sign * x[:6], sign * x[[5, 6, 7, 8, 0]]
     for order, names in ((np.diff(upper), range(6)), (-np.diff(lower), (5, 6, 7, 8, 0))):
         wrong = np.flatnonzero(order < -ORDER_TOLERANCE)
@@ -143,6 +149,7 @@ def load_labels(
             f"{size_px[1]}; use the labeled video"
         )
     frames = _frames(path, document.get("frames"), fewest)
+    # All frames have the same number of points, as `_frames` has checked.
     eyes = len(next(iter(frames.values()))) // EYE_POINTS
     for number, points in frames.items():
         check_frame(f"{path}: frame {number}", points, eyes, (width, height))
@@ -150,6 +157,7 @@ def load_labels(
             raise InputError(
                 f"{path}: frame {number} is labeled, but the video ends at frame {frame_count - 1}"
             )
+    # Only a note for people: another type in its place is not worth an error.
     origin = document.get("origin")
     return Labels(
         path,
@@ -204,6 +212,7 @@ def _proposed(path: Path, data: object) -> dict[int, Points] | None:
 
 
 def _number(path: Path, key: object) -> int:
+    # JSON has only texts as keys; decimals and signs are not frames.
     if not str(key).strip().isdecimal():
         raise InputError(f"{path}: expected a frame number from 0, found '{key}'")
     return int(str(key))
@@ -232,6 +241,7 @@ def _frames(path: Path, data: object, fewest: int) -> dict[int, Points]:
             f"{path}: some frames have {counts[0]} points and some {counts[-1]}; use the same number "
             "everywhere"
         )
+    # In the order of the video, whatever the order in the file.
     return dict(sorted(frames.items()))
 
 
@@ -241,6 +251,7 @@ def _points(where: str, data: object) -> Points:
         raise InputError(f"{where}: expected 18 points (or 9 for one eye), found {count}")
     for index, point in enumerate(data):
         pair = isinstance(point, list) and len(point) == 2
+        # By `type`, since true and false are numbers to `isinstance`.
         if not pair or not all(type(v) in (int, float) and math.isfinite(v) for v in point):
             raise InputError(f"{where}: point {index + 1} is {point!r}, expected [x, y] in pixels")
     return np.asarray(data, np.float64)
@@ -254,6 +265,7 @@ def _markers(path: Path, document: dict[str, Any], eyes: int) -> LidMarkers:
         if not isinstance(given, list) or len(given) != eyes:
             raise InputError(f"{path}: expected '{key}' with one list of points for each of {eyes} eyes")
         for number, eye in enumerate(given):
+            # Markers of an eye must be points of that eye.
             allowed = range(EYE_POINTS * number, EYE_POINTS * (number + 1))
             if (
                 not isinstance(eye, list)
@@ -278,6 +290,7 @@ def save_labels(labels: Labels, video: str, origin: str) -> None:
         "mid_lower": [list(eye) for eye in labels.markers.lower],
         "frames": _rounded(labels.frames),
     }
+    # A missing key says that nothing is known of proposals; an empty one that none are left.
     if labels.proposed is not None:
         document["proposed"] = _rounded(labels.proposed)
     with whole_text(labels.path) as stream:
@@ -326,6 +339,7 @@ def unreviewed_note(labels: Labels) -> str:
             f"{labels.path}: {waiting} of {counted(count, 'frame')} are unreviewed proposals, which are used "
             "for training as they are: correct or accept each on the labeling page"
         )
+    # An earlier version wrote such files without their proposals.
     if labels.proposed is None and labels.origin in (DETECTED, TRACKED):
         return (
             f"{labels.path}: its origin is '{labels.origin}' and it has no proposals, so reviewed frames "
