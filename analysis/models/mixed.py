@@ -53,8 +53,10 @@ def refused_where_exact(data: ModelData, terms: Sequence[Term]) -> Iterator[None
         yield
     except (np.linalg.LinAlgError, ZeroDivisionError) as error:
         # Random terms as if they were fixed: where nothing is left over, they predict every rating.
+        # lsqr takes sparse columns and needs no full rank: random terms overlap the fixed ones.
         columns = sparse.hstack([sparse.csr_matrix(data.x), *(term.matrix() for term in terms)], format="csr")
         residual = float(linalg.lsqr(columns, data.rating, atol=1e-12, btol=1e-12)[3])
+        # Another cause: the error is passed on as it is.
         if residual > EXACT * float(np.linalg.norm(data.rating - data.rating.mean())):
             raise
         raise InputError(
@@ -143,6 +145,7 @@ def fit_mixed(
     InputError
         Unknown columns, text for numbers, constant ratings, empty cells, or too few ratings for the model.
     """
+    # One column or several together name an item.
     items = (item,) if isinstance(item, str) else tuple(item or ())
     numbers, interactions = split_covariates(covariates, (*within, *between))
     terms = ModelTerms(
@@ -162,14 +165,17 @@ def fit_mixed(
     sloped, notes = slope_groups(data, slopes)
     refuse_group_slopes(data)
     random_terms = data.random_terms(slopes, sloped, random_slopes)
+    # Each pattern has one parameter of the random part; the residual variance is one more.
     parameters = sum(len(term.patterns) for term in random_terms)
     x = data.x
     if len(data.rating) <= x.shape[1] + parameters + 1:
         raise InputError(f"expected more than {x.shape[1] + parameters + 1} ratings, got {len(data.rating)}")
     # matrices this small only wait for a second thread
     with threadpool_limits(1, "blas"):
+        # Standardized ratings: the search then has the same tolerance for any unit.
         units = units_of(data.rating)
         c = cross_products(x, units.scaled(data.rating), random_terms)
+        # The search may divide by a residual of 0.
         with refused_where_exact(data, random_terms):
             theta = fit_theta(c)
         fitted = _RemlFit(data, random_terms, c, theta, units)
@@ -183,10 +189,12 @@ def fit_mixed(
             factors = [block.factor(theta) for block in c.blocks]
             at = criterion(c, theta)
             checks = mixed_checks(units.scaled(data.rating), x, at.beta, random_terms, factors, at.sigma)
+            # Back to the units of the ratings, as the figure shows them.
             moved = tuple(value * units.scale + units.middle for value in checks.fitted)
             result = replace(result, residuals=replace(checks, fitted=moved))
         if not intervals:
             return result
+        # Slopes of covariates are fitted in SDs and reported in the covariate's own unit.
         scales = [data.unit(row.term) for row in result.components]
         return with_intervals(result, c, theta, units, progress, scales)
 
@@ -222,6 +230,7 @@ def _result(
     spread: Uncertainty | KenwardRoger = known
     if df_method == "kenward-roger":
         spread = kenward_roger(fitted.terms, c, theta, at)
+    # Differences from the first level, as lmerTest writes contrasts: its df depend on that.
     effects = tuple(
         MixedEffect(effect, *spread.f_test(at.beta, data.differences(effect))) for effect in data.effects
     )
@@ -234,6 +243,7 @@ def _result(
 
     factor = c.blocks[0].factor(theta)
     components = (*components_of_people(labels, factor, sigma, slopes, data),)
+    # The first block is that of the participants, which may have correlations.
     for group, block in zip(data.groups[1:], c.blocks[1:], strict=True):
         terms = terms_of(data, group, random_slopes)
         sds = sigma * theta[block.theta] / [data.unit(term) for term in terms]
@@ -265,11 +275,14 @@ def _result(
 def _coefficients(
     data: ModelData, fitted: Floats, spread: Uncertainty | KenwardRoger, units: Units
 ) -> list[Coefficient]:
+    # The origin of the ratings goes back into the intercept, so that its test is against 0.
     beta, rows = fitted + units.middle / units.scale * np.eye(len(fitted))[0], []
     for i, name in enumerate(data.column_names):
         contrast = np.eye(len(beta))[[i]]
         f_value, _, df, p = spread.f_test(beta, contrast)
         estimate, se = float(beta[i]) * units.scale, float(np.sqrt(spread.covariance[i, i])) * units.scale
+        # F of one contrast is t squared; the sign is that of the estimate.
         t = float(np.sign(beta[i]) * np.sqrt(f_value))
+        # The smaller of two equal values: one of both may have lost digits by rounding.
         rows.append(Coefficient(name, estimate, se, df, t, float(min(p, 2 * special.stdtr(df, -abs(t))))))
     return rows

@@ -36,7 +36,9 @@ class PowerResult:
         """Of every effect the smallest simulated n from which on the power stays at `target` or above."""
         smallest: dict[str, int | None] = {}
         for effect, row in zip(self.effects, self.power, strict=True):
+            # NaN, where no test exists, is not enough.
             enough = np.nan_to_num(row) >= target
+            # After the last size that is not enough: power may dip below the target by chance.
             start = len(row) - int(np.argmin(enough[::-1])) if not enough.all() else 0
             smallest[effect] = self.n[start] if start < len(row) else None
         return smallest
@@ -55,6 +57,7 @@ def sample_sizes(text: str) -> tuple[int, ...]:
         parts = list(range(parts[0], parts[1] + 1, step))
     elif ":" in text:
         raise InputError(f"expected sample sizes as 10:60:5 or 20,30,43, got '{text}'")
+    # Below three there is no residual; above 5000 a typing error is likelier.
     if min(parts) < 3 or max(parts) > 5000:
         raise InputError(f"expected sample sizes from 3 to 5000, got {min(parts)} to {max(parts)}")
     return tuple(sorted(set(parts)))
@@ -81,6 +84,7 @@ def simulate_power(
         raise InputError(f"expected at least 10 simulations, got {simulations}")
     rng = np.random.default_rng(seed)
     population = population_of(plan, rng)
+    # Effects with a mere bound on p have no size to simulate.
     known = [t.name.removeprefix("F ") for t in plan.targets.tests if t.start is not None]
     effects = tuple(e for e in plan.space.effects if e in known)
     contrasts = [plan.space.effects[e] for e in effects]
@@ -88,6 +92,7 @@ def simulate_power(
     for column, n in enumerate(sizes):
         hits, done = np.zeros(len(effects)), 0
         while done < simulations:
+            # In chunks, so that large samples do not fill the memory.
             count = min(simulations - done, max(1, CHUNK_VALUES // (n * plan.space.n_cells)))
             y = _draw(plan, population, count, n, rng)
             hits += [_significant(y @ c, alpha, statistic) for c in contrasts]
@@ -95,6 +100,7 @@ def simulate_power(
             if progress is not None:
                 progress(count)
         power[:, column] = hits / simulations
+    # Of a share of independent data sets (binomial).
     se = np.sqrt(power * (1 - power) / simulations)
     return PowerResult(
         plan.experiment.name, statistic, alpha, simulations, seed, tuple(sizes), effects, power, se
@@ -108,6 +114,7 @@ def _draw(plan: Plan, population: Population, count: int, n: int, rng: np.random
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     y = population.means + rng.normal(size=(count, n, len(values))) @ root.T
     trials = plan.experiment.exemplars.per_cell * plan.experiment.blocks.repeats
+    # A mean of whole ratings is a whole number of their sum.
     return np.asarray(np.rint(np.clip(y, plan.scale.minimum, plan.scale.maximum) * trials) / trials)
 
 
@@ -129,11 +136,13 @@ def _significant(z: Floats, alpha: float, statistic: Statistic) -> float:
     residual = z - mean[:, None, :]
     error = residual.transpose(0, 2, 1) @ residual
     if statistic == "multivariate":
+        # The matrix of error would be singular.
         if n <= q:
             return float("nan")
         size = n * np.einsum("sq,sq->s", mean, np.linalg.solve(error, mean[:, :, None])[:, :, 0])
         return float((special.fdtrc(q, n - q, size * (n - q) / q) < alpha).sum())
     trace = np.einsum("sqq->s", error)
+    # Greenhouse and Geisser's, estimated in each data set as an analysis would.
     epsilon = trace**2 / (q * np.einsum("sij,sij->s", error, error))
     f = n * (mean**2).sum(axis=1) / trace * (n - 1)
     return float((special.fdtrc(q * epsilon, q * epsilon * (n - 1), f) < alpha).sum())
@@ -210,6 +219,7 @@ def simulate_design(
             p[row] = design.p_values(n, rng)
             if progress is not None:
                 progress(1)
+        # A comparison with NaN is false: a data set without a test is one without a finding.
         power[:, column] = np.where(np.isnan(p).all(axis=0), np.nan, (p < alpha).mean(axis=0))
     se = np.sqrt(power * (1 - power) / simulations)
     return PowerResult(name, design.test, alpha, simulations, seed, tuple(sizes), design.effects, power, se)
@@ -222,6 +232,7 @@ def sample_size_text(result: PowerResult, design: Design, target: float, version
     for effect, row, errors in zip(result.effects, result.power, result.se, strict=True):
         n = smallest[effect]
         if n is None:
+            # All NaN: no sample size allows the test.
             best = float(np.nanmax(row)) if not np.isnan(row).all() else float("nan")
             said.append(
                 f"{effect}: not reached with up to {result.n[-1]} participants (maximum power {best:.2f})"

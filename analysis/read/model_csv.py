@@ -53,6 +53,7 @@ def read_model_input(
         Unknown columns, a column in two roles, items that are the participants under another name, ratings
         that are not numbers, or no factor.
     """
+    # Only the header: defaults depend on it, and on them which columns are read.
     header = read_text_table(path, [participant, rating], copies=False).header
     exported = "kind" in header and "profile_id" in header
     if not within and exported and not between and not no_predictors:
@@ -85,6 +86,7 @@ def read_model_input(
         decisions += left_out
     if np.isnan(values).any():
         decisions.append(f"{np.isnan(values).sum()} rows without a rating excluded")
+    # Counted among the rows that are left, so that no row is named twice.
     for name, column in measured.items():
         if (without := np.isnan(column) & keep).any():
             decisions.append(f"{without.sum()} rows without {name} excluded")
@@ -108,6 +110,7 @@ def _refuse_shared_roles(participant: str, rating: str, within: Sequence[str], i
         )
     names = [participant, rating, *within]
     for name in names:
+        # The rating cannot also be an item; a factor can, where each level is one clip.
         if names.count(name) > 1 or (name in item and name != participant and name == rating):
             raise InputError(f"column '{name}' is named for two roles; each role needs a separate column")
 
@@ -117,8 +120,10 @@ def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequ
     if not item:
         return
     pairs = table.columns[[participant, *item]].drop_duplicates()
+    # A separator that no cell contains: a-b and c must differ from a and b-c.
     what = pairs[list(item)].astype(str).agg("\x1f".join, axis=1)
     people = pairs[participant].astype(str)
+    # As many pairs as people and as items: each belongs to exactly one.
     if len(pairs) > 1 and len(pairs) == people.nunique() == what.nunique():
         raise InputError(
             f"every item of '{'/'.join(item)}' belongs to one participant and every participant has one, so "

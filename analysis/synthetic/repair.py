@@ -31,6 +31,7 @@ def test_after_moves(y: Floats, contrasts: Floats, step: Floats) -> Floats:
     n, q = y.shape[0], contrasts.shape[1]
     z = y @ contrasts
     u = z.mean(axis=0)
+    # Once for all moves: each changes it by rank two.
     inverse = np.linalg.inv(z.T @ z)
     zb, cb = z @ inverse, contrasts @ inverse
     zz, zu = np.einsum("ij,ij->i", zb, z)[:, None], (zb @ u)[:, None]
@@ -39,6 +40,7 @@ def test_after_moves(y: Floats, contrasts: Floats, step: Floats) -> Floats:
     e = step[:, None, None]
     xx = uu + 2 * e / n * cu + (e / n) ** 2 * cc
     zx, cx = zu + e / n * zc, cu + e / n * cc
+    # Woodbury's inner matrix, 2 x 2, is inverted by hand.
     g11, g12 = zz - 1, zc + 1 / e
     lost = (cc * zx**2 - 2 * g12 * zx * cx + g11 * cx**2) / (g11 * cc - g12**2)
     pillai = n * (xx - lost)
@@ -48,6 +50,7 @@ def test_after_moves(y: Floats, contrasts: Floats, step: Floats) -> Floats:
 def miss(value: Floats, low: Floats | float, high: Floats | float, scale: Floats | float) -> Floats:
     """Distance outside the window in units of `scale`: squared near, linear far away."""
     distance = np.maximum(np.maximum(low - value, value - high), 0.0) / scale
+    # Smooth at the window, so that near misses count little; linear far away, so that none dominates.
     return np.where(distance < 1, distance**2, 2 * distance - 1)
 
 
@@ -73,6 +76,7 @@ class _Stack:
 
     @classmethod
     def of(cls, targets: "tuple[MeanTarget | SpreadTarget | TestTarget, ...]", cells: int) -> "_Stack":
+        # A test of one contrast is a weight vector as well.
         rows = [t.contrasts[:, 0] if isinstance(t, TestTarget) else t.weights for t in targets]
         columns = [np.array([getattr(t, name) for t in targets]) for name in ("low", "high", "scale")]
         low, high, scale = (c.reshape(-1, 1, 1, 1) for c in columns)
@@ -90,6 +94,7 @@ class MoveLoss:
         tests = (*targets.tests, *targets.pairs)
         self.means = _Stack.of((*targets.means, *targets.directions), cells)
         self.spreads = _Stack.of(targets.spreads, cells)
+        # Tests of one contrast need no matrices, and are most of them.
         self.single = _Stack.of(tuple(t for t in tests if t.contrasts.shape[1] == 1), cells)
         self.blocks = tuple(t for t in tests if t.contrasts.shape[1] > 1)
 
@@ -114,6 +119,7 @@ class MoveLoss:
         z = y @ weights.T
         change = weights[:, None, None, :] * step[None, :, None, None]
         mean = z.mean(axis=0)[:, None, None, None] + change / n
+        # (z + c)2 - z2 = c (2 z + c), without a second pass over the data.
         squares = (z * z).sum(axis=0)[:, None, None, None] + change * (2 * z.T[:, None, :, None] + change)
         pillai = n * mean**2 / squares
         return self.single.loss(pillai / (1 - pillai) * (n - 1))
@@ -124,8 +130,10 @@ class MoveLoss:
         v = v - v.mean(axis=0)
         change = weights[:, None, None, :] * step[None, :, None, None]
         squares = (v * v).sum(axis=0)[:, None, None, None] + change * (
+            # A change of one value moves the mean, too, hence 1 - 1/n.
             2 * v.T[:, None, :, None] + change * (1 - 1 / n)
         )
+        # Rounding may leave a sum of squares just below 0.
         return self.spreads.loss(np.sqrt(np.maximum(squares, 0.0) / (n - 1)))
 
 
@@ -193,6 +201,7 @@ class _Search:
         self.signs = np.array([1, -1])
 
     def losses(self) -> Floats:
+        # Sums in the moves, means in the targets.
         loss = self.loss_of.after_moves(self.sums / self.trials, self.signs / self.trials)
         # A move off the scale is never the best.
         loss[0][self.sums >= self.high] = np.inf
@@ -222,13 +231,16 @@ class _Search:
         chosen, reached = None, below
         for _ in range(FIRST_MOVES):
             first = (int(self.rng.integers(2)), int(self.rng.integers(n)), int(self.rng.integers(cells)))
+            # At an end of the scale a move may leave it: such ratings are passed over.
             if not self.low < self.sums[first[1], first[2]] < self.high:
                 continue
             self.move(first)
             second, loss = self.best()
+            # Only tried: the pair is made once all first moves are compared.
             self.move(first, back=True)
             if loss < reached:
                 chosen, reached = (first, second), loss
+                # Nothing can be better.
                 if loss == 0:
                     break
         for index in chosen or ():
@@ -251,6 +263,7 @@ def repair(
     dead end a few random ones lead on. Ends when every target is hit or after `maximum_pairs` rounds of
     paired changes. `progress` gets (targets missed, step).
     """
+    # The nearest whole sums, which miss most figures by a little.
     sums = np.clip(np.rint(cell_means * trials), trials * scale[0], trials * scale[1]).astype(np.int64)
     search = _Search(sums, trials, scale, targets, rng)
     now, stalled, paired, step = np.inf, 0, 0, 0
@@ -258,6 +271,7 @@ def repair(
     while missed and paired < maximum_pairs and step < MAXIMUM_STEPS:
         step += 1
         index, loss = search.best()
+        # Strictly less, or two equal moves would follow each other for ever.
         if loss < now:
             search.move(index)
             now = loss

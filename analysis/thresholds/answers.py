@@ -24,6 +24,7 @@ from experiments.errors import InputError
 Array = NDArray[np.float64]
 
 
+# 1.0 comes from programs that write all numbers as decimals.
 YES = frozenset({"1", "yes", "true", "correct", "seen", "y", "1.0"})
 
 
@@ -80,10 +81,12 @@ def read_answers(
     named = [name for name in (participant, by) if name]
     roles = [x, response, *named, *([second] if second else [])]
     refuse_shared_roles(roles)
+    # Columns of an export are read as well: they say which answers count.
     table = read_text_table(path, roles, EXPORT_COLUMNS)
     for name in named:
         texts_required(table, name, factor=name == by)
     values, answers = numbers(table, x), _binary(table, response)
+    # Of a row without stimulus or answer nothing can be fitted.
     keep = np.isfinite(values) & np.isfinite(answers)
     across = numbers(table, second) if second else None
     if across is not None:
@@ -93,11 +96,13 @@ def read_answers(
         table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer excluded ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
+    # Last, so that its counts are of rows that would otherwise be used.
     keep = answers_that_count(table, keep, "answers")
     names = [
         None if name is None else table.columns[name].astype(object).to_numpy()[keep]
         for name in (participant, by)
     ]
+    # Of the rows that stay: a condition may have been in practice only.
     order = () if by is None else names_in_order(table.columns[by], keep)
     orders, said = given_orders({} if by is None else {by: order}, levels)
     return Answers(
@@ -114,9 +119,11 @@ def read_answers(
 
 
 def _binary(table: TextTable, response: str) -> Array:
+    # Case is ignored: tables hold Yes, TRUE and correct in any form.
     texts = table.columns[response].astype(str).str.casefold().to_numpy()
     values = np.full(texts.size, np.nan)
     values[np.isin(texts, list(YES))], values[np.isin(texts, list(NO))] = 1.0, 0.0
+    # Empty cells and marks of missing values are rows to leave out, not errors.
     unknown = np.isnan(values) & (texts != "") & (texts != "na") & (texts != "nan")
     if unknown.any():
         row = int(np.argmax(unknown))
@@ -132,6 +139,7 @@ def count_trials(x: Array, response: Array) -> Trials:
     """Count trials and positive answers at each level of x."""
     levels, index = np.unique(x, return_inverse=True)
     n, k = np.zeros(levels.size), np.zeros(levels.size)
+    # Not `+=`, which would count a level that occurs several times only once.
     np.add.at(n, index, 1.0)
     np.add.at(k, index, response)
     return Trials(levels, n, k)

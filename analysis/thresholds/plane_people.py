@@ -105,6 +105,7 @@ def _turned(ends: tuple[float | None, float | None], sign: float) -> Interval:
     low, high = ends
     if sign > 0:
         return Interval(low, high)
+    # A mirrored axis turns the ends around.
     return Interval(None if high is None else -high, None if low is None else -low)
 
 
@@ -119,6 +120,7 @@ class MarginalLikelihood:
         self.n, self.k = np.zeros((2, len(people), len(stimuli)))
         for person, one in enumerate(people):
             at = [rows[x, z] for x, z in zip(one.x.tolist(), one.z.tolist(), strict=True)]
+            # Stimuli that a person has not seen keep n = 0 and add nothing.
             self.n[person, at], self.k[person, at] = one.n, one.k
         self.x, self.away = self.sign * stimuli[:, :1], stimuli[:, 1:] - pooled.middle
         u, v = (np.linspace(-end, end, count) for end, count in zip(END, NODES, strict=True))
@@ -128,7 +130,9 @@ class MarginalLikelihood:
         # grid lose nothing that counts.
         self.log_weights = weights - special.logsumexp(weights)
         self.width = float(np.ptp(self.x))
+        # A tilt changes x along z, so its unit is the ratio of both ranges.
         self.slope_unit = self.width / float(np.ptp(self.away))
+        # F(1, n - 1), the square of t: with few people chi-squared would be too sure.
         self.limit = float(stats.f.ppf(0.95, 1, len(people) - 1))
 
     @property
@@ -137,6 +141,7 @@ class MarginalLikelihood:
         fit = self.pooled
         # A pooled spread near zero would start the search on a step, whose gradient says little.
         spread = max(fit.spread, 0.02 * self.width)
+        # Logarithms keep spreads above 0 in the search.
         logs = np.log([spread, spread / 2, 0.1 * self.slope_unit])
         return np.array([self.sign * fit.threshold, self.sign * fit.tilt, *logs])
 
@@ -185,6 +190,7 @@ class MarginalLikelihood:
             f = special.expit(eta)
             slope = f * special.expit(-eta)
         scale = 1 - fit.guess - fit.lapse
+        # Away from 0 and 1, whose logarithm has no limit.
         return np.clip(fit.guess + scale * f, 1e-12, 1 - 1e-12), scale * slope
 
     def maximum(self, start: Array, held: int | None = None) -> tuple[Array, float]:
@@ -200,6 +206,7 @@ class MarginalLikelihood:
             return -value, -(gradient * units)[free]
 
         low_sd, low_tilt = np.log(SMALLEST * self.width), np.log(SMALLEST * self.slope_unit)
+        # Means are free; spreads stay between a step and a flat line.
         far = [(None, None), (None, None), (np.log(self.width / 200), np.log(20 * self.width))]
         bounds = [*far, (low_sd, np.log(5 * self.width)), (low_tilt, np.log(20 * self.slope_unit))]
         optimum = optimize.minimize(
@@ -221,6 +228,7 @@ class MarginalLikelihood:
 
     def _end(self, best: Array, value: float, part: int, unit: float) -> float | None:
         """By secants on the root of twice the fall, which is nearly straight."""
+        # At the estimate itself the fall is 0.
         root, below, above = np.sqrt(self.limit), (0.0, 0.0), None
         away = unit / 20
         for _ in range(SECANTS):
@@ -228,6 +236,7 @@ class MarginalLikelihood:
             held[part] += away
             # The root of the fall is linear where the profile is a parabola, so that secants arrive in a
             # few steps.
+            # Rounding may put the held maximum above the free one.
             height = float(np.sqrt(max(0.0, 2 * (value - self.maximum(held, part)[1]))))
             if abs(height - root) < CLOSE * root:
                 return float(best[part] + away)
@@ -236,6 +245,7 @@ class MarginalLikelihood:
             else:
                 above = (away, height)
             away = _next(below, above, float(root))
+            # A profile so flat has no end: the interval is open on this side.
             if abs(away) > FARTHEST * abs(unit):
                 return None
         return float(best[part] + away)
@@ -337,6 +347,7 @@ def fit_planes(
     labels = np.full(size, "all", dtype=object) if answers.condition is None else answers.condition
     names = np.full(size, "", dtype=object) if answers.participant is None else answers.participant
     if middle is None:
+        # Of all answers, so that conditions are compared at the same place.
         middle = float(answers.second.min() + answers.second.max()) / 2
     pooled: dict[str, Plane] = {}
     reasons: dict[str, str] = {}
@@ -350,13 +361,17 @@ def fit_planes(
             reasons[condition] = reason
         else:
             pooled[condition] = fit
+        # Sorted, so that a report lists people in the same order each time.
         every = {name: points_of(answers, rows & (names == name)) for name in sorted({*names[rows]} - {""})}
         for name, mine in every.items():
+            # One person: the interval along the whole line is needed for pooled fits only.
             fitted_own = fit_or_reason(mine, shape, guess, lapse, down, middle, along=False)
             people.append(PersonPlane(str(name), condition, *fitted_own))
+        # The pooled fit is where the search for the population starts.
         if fit is not None and len(every) >= PEOPLE_MIN:
             population[condition] = fit_plane_population(list(every.values()), fit)
     if not pooled:
+        # The first reason; others are mostly the same.
         raise InputError(f"{answers.source}: {next(iter(reasons.values()))}")
     means = {
         condition: means_of([one for one in people if one.condition == condition]) for condition in pooled
@@ -366,6 +381,7 @@ def fit_planes(
 
 def _falls(answers: Answers, rows: NDArray[np.bool_], guess: float) -> bool:
     x, y = answers.x[rows], answers.response[rows]
+    # With a guess rate, answers are right or wrong: they rise with what makes a stimulus easy.
     return guess == 0.0 and float(np.sum((x - x.mean()) * y)) < 0
 
 

@@ -86,6 +86,7 @@ def bayes_anova(anova: AnovaResult, slopes: bool = True) -> BayesAnova:
     block's sums of squares and df, n_i(g) g times the number of values behind a coefficient, R the residual,
     and :math:`\nu` all cell means less one.
     """
+    # With groups or covariates effects are no longer orthogonal, which the integrals need.
     if anova.between.factors or anova.between.matrix.shape[1] > 1:
         raise InputError("--bayes is for factors within participants; remove --between and --covariate")
     if len(anova.factors) > FACTORS_MAX:
@@ -97,16 +98,19 @@ def bayes_anova(anova: AnovaResult, slopes: bool = True) -> BayesAnova:
     base = strata.log_density + strata.participants()
     logs = {}
     for model in _models(effects):
+        # Blocks are independent given the precision: their logs add up.
         chosen = sum((with_effect[e] if e in model else without[e] for e in effects), base)
         logs[model] = float(special.logsumexp(chosen + strata.log_tau))
     null = logs[frozenset()]
     names = {effect: effect_name([anova.factors[k] for k in effect]) for effect in effects}
     inclusions = []
     for effect in effects:
+        # Matched models: with the effect, and without interactions that contain it.
         bigger = [m for m in logs if effect in m and not any(set(effect) < set(other) for other in m)]
         ratio = special.logsumexp([logs[m] for m in bigger]) - special.logsumexp(
             [logs[m - {effect}] for m in bigger]
         )
+        # exp overflows above 709; the logarithm keeps the whole.
         inclusions.append(BayesEffect(names[effect], float(np.exp(min(ratio, 700.0))), float(ratio)))
     models = sorted(logs.items(), key=lambda item: -item[1])
     return BayesAnova(
@@ -124,6 +128,7 @@ def _models(effects: Sequence[Members]) -> list[frozenset[Members]]:
     for size in range(len(effects) + 1):
         for chosen in combinations(effects, size):
             inside = set(chosen)
+            # An interaction without its parts would depend on how levels are coded.
             parts = (p for e in chosen for k in range(1, len(e)) for p in combinations(e, k))
             if inside.issuperset(parts):
                 models.append(frozenset(chosen))
@@ -134,10 +139,12 @@ class _Strata:
     """Sums of squares of the effects, and their integrals on a grid of precisions."""
 
     def __init__(self, anova: AnovaResult, slopes: bool) -> None:
+        # Orthonormal contrasts of each effect, by column.
         scores, columns = contrast_scores(anova.y)
         self.people, self.cells = scores.shape
         self.effects = [members for members in columns if members]
         self.slopes = slopes
+        # In units of the total variance, so that the grid of precisions fits every scale.
         unit = float((scores**2).sum() / (scores.size - 1))
         if not unit > 0:
             raise InputError("the cell means do not vary, so there is no Bayes factor")
@@ -149,6 +156,7 @@ class _Strata:
         self.df = {m: squares[m].shape[1] for m in self.effects}
         sizes = anova.y.shape[1:]
         self.per_level = {m: self.cells / float(np.prod([sizes[k] for k in m])) for m in self.effects}
+        # The highest interaction: its differences between people are the residual.
         residual = max(self.effects, key=len)
         if self.error[residual] <= 1e-12:
             raise InputError("participants are alike in every effect, so no residual is left to compare with")
@@ -157,6 +165,7 @@ class _Strata:
         n = scores.size - 1
         sd = float(np.sqrt(2 / n))
         end = float(np.log(n / min(self.error[residual], n))) + 10 * sd
+        # A third of an SD apart: the integrand is far smoother.
         self.log_tau = np.arange(-10 * sd, end, sd / 3)
         self.tau = np.exp(self.log_tau)
         self.log_density = (n / 2 - 1) * self.log_tau
@@ -164,11 +173,13 @@ class _Strata:
     def _prior(self, scale: float) -> Floats:
         """Log of the density of g times g, on its grid of logarithms."""
         density = np.log(scale) - 0.5 * np.log(2 * np.pi) - 1.5 * LOG_G - scale**2 / (2 * self.g)
+        # A density over log g has the factor g; the last term is the width of a step.
         return np.asarray(density + LOG_G + np.log(LOG_G[1] - LOG_G[0]), dtype=np.float64)
 
     def participants(self) -> Floats:
         """Log h of participants' means (t,)."""
         shrunk = 1 + self.cells * self.g
+        # One df less: the mean over all people belongs to the intercept.
         logs = self._prior(SCALE_RANDOM) - (self.people - 1) / 2 * np.log(shrunk)
         return _integrated(logs[None] - self.tau[:, None] / 2 * (self.of_people / shrunk))
 
@@ -190,9 +201,11 @@ class _Strata:
         if not is_fixed:
             logs = logs - q / 2 * np.log(of_slopes)
             return _integrated(logs[None] - self.tau[:, None] / 2 * ((error + fixed) / of_slopes))
+        # Two variances at once, of the effect and of its slopes: a grid in two dimensions.
         both = of_slopes[:, None] + n * self.g[None]
         logs = logs[:, None] + self._prior(SCALE_FIXED)[None] - q / 2 * np.log(both)
         exponent = error / of_slopes[:, None] + fixed / both
+        # A precision at a time: all at once would hold millions of numbers.
         return np.array([special.logsumexp(logs - tau / 2 * exponent) for tau in self.tau])
 
 

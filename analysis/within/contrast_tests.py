@@ -70,6 +70,7 @@ def contrasts_of(
                 f"contrast '{name}' of '{factor}' has {len(weights)} weights for "
                 f"{len(margin.combinations)} levels"
             )
+        # Relative to the weights: thirds and sixths do not sum to 0 exactly.
         if abs(sum(weights)) > 1e-9 * max(1.0, *map(abs, weights)) or not any(weights):
             raise InputError(
                 f"the weights of contrast '{name}' of '{factor}' should sum to zero, and not all be zero"
@@ -78,6 +79,7 @@ def contrasts_of(
     # Weights of a contrast may be of any size: so is what rounding leaves of it.
     scale = float(np.abs(result.y).max()) * max(1.0, float(np.abs(every).sum(axis=1).max()))
     estimates, errors, t = margin.tested(every, scale)
+    # The lower tail twice keeps the digits of small p.
     p = 2 * special.stdtr(margin.df, -np.abs(t))
     reach = float(special.stdtrit(margin.df, 0.5 + confidence / 2)) * errors
     return tuple(
@@ -99,8 +101,10 @@ def contrasts_of(
 def polynomial_weights(values: Sequence[float]) -> Floats:
     """Orthonormal polynomial contrasts (degrees, levels) of levels at `values`, spaced as they are."""
     x = np.array(values, dtype=np.float64)
+    # Centered and within one unit: powers of large numbers would nearly coincide.
     powers = np.vander((x - x.mean()) / np.ptp(x), len(x), increasing=True)
     basis, triangle = np.linalg.qr(powers)
+    # The sign that makes each trend rise at the end; the constant first row is left out.
     return np.asarray((basis * np.sign(np.diag(triangle))).T[1:], dtype=np.float64)
 
 
@@ -109,9 +113,11 @@ def trends(result: AnovaResult) -> tuple[Contrast, ...]:
     contrasts: list[Contrast] = []
     for factor, levels in zip(result.all_factors, result.all_levels, strict=True):
         values = _as_numbers(levels)
+        # Two levels have one difference, which the pairs test.
         if values is None or len(levels) < 3:
             continue
         weights = polynomial_weights(values)[: len(DEGREES)]
+        # `strict=False`: fewer levels than degrees.
         contrasts += contrasts_of(result, factor, list(zip(DEGREES, weights.tolist(), strict=False)))
     return tuple(contrasts)
 
@@ -121,6 +127,7 @@ def _as_numbers(levels: Sequence[str]) -> list[float] | None:
         values = [float(level) for level in levels]
     except ValueError:
         return None
+    # Two names of one number (1 and 1.0) would have no polynomial.
     return values if np.isfinite(values).all() and len(set(values)) == len(values) else None
 
 
@@ -129,7 +136,9 @@ def equivalence_p(difference: float, se: float, df: float, bounds: tuple[float, 
     low, high = bounds
     if not low < 0 < high:
         raise InputError(f"expected bounds around zero, like -0.5,0.5, got {low:g} and {high:g}")
+    # Both as lower tails: the greater p has the greater value.
     above, below = -(difference - low) / se, (difference - high) / se
+    # Infinite df: the normal distribution.
     if not np.isfinite(df):
         return float(special.ndtr(max(above, below)))
     return float(special.stdtr(df, max(above, below)))
@@ -143,10 +152,12 @@ def equivalence(
         raise InputError(f"expected bounds around zero, like -0.5,0.5, got {low:g} and {high:g}")
     tests = []
     for pair in pairs:
+        # A pair in which nobody differs has no standard error.
         if not np.isfinite(pair.t):
             continue
         lower = float(special.stdtr(pair.df, -(pair.difference - low) / pair.se))
         upper = float(special.stdtr(pair.df, (pair.difference - high) / pair.se))
+        # 1 - alpha on each side: an interval of 1 - 2 alpha.
         reach = float(special.stdtrit(pair.df, 1 - alpha)) * pair.se
         tests.append(
             Equivalence(

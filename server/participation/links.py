@@ -64,6 +64,7 @@ def find_link(session: Session, token: str) -> Link:
 
 def recruiter_of(link: Link) -> Recruiter:
     """The recruiter of a link, or of its study."""
+    # A link may have its own recruiter.
     return stored_recruiter(link.recruiter or link.study.recruiter)
 
 
@@ -72,10 +73,12 @@ def link_state(versions: Versions, session: Session, token: str) -> LinkState:
     link = find_link(session, token)
     version_id = run_repository.active_version_id(session, link.study)
     experiment = versions.get(session, version_id).experiment
+    # Only a personal link is of one person, whose run it can show.
     run = run_repository.latest_run(session, link) if link.kind == "personal" else None
     resumable = (
         run is not None and run.status == "active" and returning.refusal_to_resume(experiment, run) is None
     )
+    # A run that must restart leaves the link open.
     over = run is not None and not resumable and not returning.must_restart(experiment, run)
     status = _status(session, link, link.study, version_id, experiment)
     return LinkState(
@@ -87,6 +90,7 @@ def link_state(versions: Versions, session: Session, token: str) -> LinkState:
             background=experiment.display.background,
             expected_minutes=expected_minutes(experiment),
         ),
+        # A run under way goes on, even where no new one may begin.
         status="open" if resumable else "used" if over else status,
         kind=link.kind,
         resumable=resumable,
@@ -113,7 +117,9 @@ def start_run(
 ) -> RunStarted:
     """Begin a run, or give back the one this browser, person or personal link already has."""
     link = find_link(session, token)
+    # Locked first in every request: two orders of locks would wait for each other.
     study = run_repository.lock_study(session, link.study_id)
+    # By client id, personal link or the recruiter's id: asking twice gives one run.
     known = returning.known_run(settings, versions, session, link, recruiter_of(link), start)
     if known is not None:
         experiment = versions.get(session, known.version_id).experiment
@@ -121,6 +127,7 @@ def start_run(
             return _resume_run(settings, experiment, known, start.client_id)
         with session.begin_nested():  # should a new visit be refused, the old one stays as it is
             known.status = "withdrawn"
+            # Client ids are unique; the new run needs this one.
             known.client_id = f"{known.client_id}:{known.public_id}"
             session.flush()
             return _begin_run(settings, versions, intake, session, link, study, start)
@@ -144,6 +151,7 @@ def _begin_run(
     if status != "open":
         refusal, message = _REFUSALS[status]
         raise refusal(message)
+    # A personal link names its person already, and simulated people come from no recruiter.
     if link.kind == "general" and not link.synthetic:
         refuse_other_recruiter(recruiter_of(link), start.query)
     if start.language not in loaded.experiment.languages:
@@ -158,14 +166,17 @@ Status = Literal["open", "closed", "expired", "full", "paused"]
 
 def _status(session: Session, link: Link, study: Study, version_id: int, experiment: Experiment) -> Status:
     """Whether a new run may begin: open, or the reason why not."""
+    # Before all else: an expired link is closed for previews as well.
     if link.expires_at is not None and link.expires_at <= now():
         return "expired"
+    # Previews and simulations take no place and need no live study.
     if link.kind == "preview" or link.synthetic:
         return "open"
     if study.status not in ("pilot", "live") or places.leads_nowhere(experiment, link):
         return "closed"
     if study.paused:
         return "paused"
+    # A run that is silent for longer gives its place to others.
     lease = timedelta(minutes=experiment.session.lease_minutes)
     for quota, column, ident in (
         (link.quota, StudyRun.link_id, link.id),
@@ -198,8 +209,10 @@ def _resume_run(settings: Settings, experiment: Experiment, run: StudyRun, clien
     if refusal is not None:
         raise refusal
     run.last_seen_at = now()
+    # Derived: the same run has the same token, which is stored as a hash only.
     token = derived_token(settings.key, RUN_PURPOSE, run.public_id)
     run.token_hash = hash_token(token)
+    # The same browser before consent has seen nothing yet: to it the run is new.
     again = run.client_id != str(client_id) or run.consented_at is not None
     return RunStarted(run_token=token, run_id=run.public_id, resumed=again)
 
@@ -246,11 +259,13 @@ def _new_run(
         recruiter=recruiter.kind if identifier and not link.synthetic else "",
         view_tickets=start.view_tickets or evidence == "asked",
     )
+    # The rows below refer to the number of this one.
     run_repository.add_all(session, [run])
     if start.query:
         written = recruiter.participant(start.query) or ""
         known_as = ParticipantIdentity(written, without_signature(recruiter, start.query))
         identities.store_identity(session, run, study.pseudonym_key, known_as, identifier)
+    # Otherwise the group, and with it the slot, follows from an answer.
     if deciding_question(loaded.experiment) is None:
         group = _group(loaded.experiment, link)
         assign_slot(

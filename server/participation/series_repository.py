@@ -31,11 +31,13 @@ def trial(connection: Connection, run: int, trial_index: int) -> Any:
 
 def trials(connection: Connection, run: int) -> Sequence[Any]:
     """Every trial of the run's series in order, with how many plays of it are stored."""
+    # In the same statement: a trial with a stored play is no longer open.
     plays = (
         select(func.count())
         .where(_ratings.c.study_run_id == run, _ratings.c.trial_index == _trials.c.trial_index)
         .scalar_subquery()
     )
+    # Practice shows a stimulus of the grid, too, but belongs to no series.
     query = select(_trials, plays.label("plays")).where(
         _trials.c.study_run_id == run, _trials.c.series.is_not(None)
     )
@@ -44,6 +46,7 @@ def trials(connection: Connection, run: int) -> Sequence[Any]:
 
 def offered_clip(connection: Connection, run: int, trial_index: int, known: int) -> int | None:
     """The clip that was chosen for a trial from so many answers; None where none was."""
+    # A choice is known by how many answers it rests on, which the page sends back.
     query = select(_offers.c.version_clip_id).where(
         _offers.c.study_run_id == run, _offers.c.trial_index == trial_index, _offers.c.known == known
     )
@@ -63,8 +66,10 @@ def answers(connection: Connection, run: int) -> Sequence[Any]:
     query = (
         select(_trials.c.series, _answers)
         .select_from(_answers.join(_trials, _same_trial(_answers)))
+        # Answers of failed plays are stored, but do not count.
         .where(_answers.c.study_run_id == run, _answers.c.counts.is_(True))
     )
+    # By number, as the moments of two answers may be equal.
     return connection.execute(query.order_by(_answers.c.number)).all()
 
 
@@ -84,6 +89,7 @@ def _same_trial(table: Table) -> Any:
 
 def add_trials(connection: Connection, rows: list[dict[str, Any]]) -> None:
     """Store the places of a run's trials in their series."""
+    # An insert of no rows is an insert of one row of defaults.
     if rows:
         connection.execute(insert(_trials), rows)
 
@@ -95,6 +101,7 @@ def add_answer(connection: Connection, values: dict[str, Any]) -> None:
 
 def add_offers(connection: Connection, rows: Iterable[dict[str, Any]]) -> None:
     """Store choices."""
+    # As above: nothing to insert.
     if values := list(rows):
         connection.execute(insert(_offers), values)
 
@@ -121,5 +128,6 @@ def close_trials(connection: Connection, run: int, trial_indices: Sequence[int])
     """Mark trials as needing no answer, and count them as settled."""
     where = (_trials.c.study_run_id == run, _trials.c.trial_index.in_(trial_indices))
     connection.execute(update(_trials).where(*where).values(closed=True))
+    # Added in the database, so that no older count is written back.
     settled = _runs.c.trials_answered + len(trial_indices)
     connection.execute(update(_runs).where(_runs.c.id == run).values(trials_answered=settled))

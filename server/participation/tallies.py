@@ -24,6 +24,7 @@ RT_MS, ONSET_MS, ONSET_BINS = 250, 10, 11
 UNIT = 1000
 """Values are counted in whole thousandths, so that sums are the same in whatever order answers come."""
 _CLIP_BITS, _VALUE_BITS = 18, 28
+# Half of the range, so that negative values are stored as positive numbers.
 _ZERO = 1 << _VALUE_BITS - 1
 
 
@@ -65,6 +66,7 @@ class ClipTime(NamedTuple):
     def same(self, other: "ClipTime") -> bool:
         """True where both say the same, but for what sums differ by the order of their terms."""
         sums = zip(self[:2], other[:2], strict=True)
+        # Moments are exact; sums of floats depend on the order of their terms.
         return self[2:] == other[2:] and all(math.isclose(one, two, abs_tol=1e-6) for one, two in sums)
 
     def since(self, issued_at: datetime) -> float | None:
@@ -73,6 +75,7 @@ class ClipTime(NamedTuple):
             return 0.0
         if issued_at == self.newest_issued_at:
             return self.newest_clip_ms
+        # From the first ticket on: that is all of the time.
         is_first = self.first_issued_at is not None and issued_at <= self.first_issued_at
         return self.clip_ms if is_first else None
 
@@ -91,6 +94,7 @@ def numbers(clips: Iterable[tuple[int, str]]) -> dict[int, NumberedClip]:
     """
     cells: dict[str, int] = {}
     return {
+        # A dict keeps the order of insertion, so its length is the next number.
         clip: NumberedClip(number, cells.setdefault(cell, len(cells)))
         for number, (clip, cell) in enumerate(clips)
     }
@@ -132,6 +136,7 @@ class TallyEntry(NamedTuple):
 
 def unpack_answer(code: int) -> tuple[int, int | None, float]:
     """Clip, second clip and value of a packed answer."""
+    # Undoes `packed`: the second clip counts from 1, and 0 says that there is none.
     clip, second = divmod(code >> _VALUE_BITS, 1 << _CLIP_BITS)
     return clip, second - 1 if second else None, (code % (1 << _VALUE_BITS) - _ZERO) / UNIT
 
@@ -201,19 +206,23 @@ class Tally:
 
     def add(self, play: Play) -> None:
         """Count one more play."""
+        # Practice and attention checks are in the heat map, too.
         self._mark(play.trial_index, LETTERS[play.verdict])
         self.not_good += play.verdict in ("flagged", "failed")
         if not play.is_main:
             return
+        # The rule comes last and may be empty.
         key = f"{play.verdict} {play.method} {play.rule}"
         self.plays[key] = self.plays.get(key, 0) + 1
         # What is counted for results is what the analysis keeps; a failed play counts in `plays` alone.
         if play.verdict == "failed" or not play.answers:
             return
         if play.rt is not None:
+            # A text, as keys of JSON are.
             time = str(int(play.rt // RT_MS))
             self.times[time] = self.times.get(time, 0) + 1
         if play.onset is not None:
+            # Made when needed: studies without measured onsets store an empty list.
             self.onsets = self.onsets or [0] * ONSET_BINS
             self.onsets[min(int(play.onset // ONSET_MS), ONSET_BINS - 1)] += 1
         for answer in play.answers:
@@ -221,11 +230,13 @@ class Tally:
 
     def _mark(self, trial: int, letter: str) -> None:
         heat = self.heat.ljust(trial + 1, ".")
+        # The best play counts: a repeat after a failed one settles the trial.
         if _BETTER[letter] > _BETTER[heat[trial]]:
             heat = heat[:trial] + letter + heat[trial + 1 :]
         self.heat = heat
 
     def _take(self, answer: TallyEntry) -> None:
+        # Q: unsigned numbers of 8 bytes.
         self.answers.setdefault(answer.scale, array("Q")).append(answer.packed())
         if answer.cell is None:
             return
@@ -242,6 +253,7 @@ class Tally:
         return {
             "heat": self.heat,
             "not_good": self.not_good,
+            # Without blanks: one text for each run is read for every result.
             "counts": json.dumps(counts, separators=(",", ":")),
             "answers": json.dumps(packed, separators=(",", ":")),
             **self.clip_time._asdict(),
@@ -252,6 +264,7 @@ class Tally:
         return self._sorted() == other._sorted() and self.clip_time.same(other.clip_time)
 
     def _sorted(self) -> tuple[Any, ...]:
+        # Sorted, as answers may have been stored in another order than counted.
         answers = {scale: sorted(codes) for scale, codes in self.answers.items()}
         return self.heat, self.not_good, self.plays, self.times, self.onsets, self.cells, answers
 

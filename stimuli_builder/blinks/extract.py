@@ -45,6 +45,7 @@ def recognised_blinks(
         Blinks cut by a gap or by an end of the recording are refused.
     """
     smooth = smooth_distance(series, options)
+    # Only blinks: a squint next to a blink does not end it.
     events = _parted([event for event in recognised.events if event.kind == "blink"], smooth, series.fps)
     blinks = [_labelled(event, touches, smooth, series.fps, options) for event, touches in events]
     refused = [RefusedMinimum(frame, CUT) for frame in recognised.cut]
@@ -60,9 +61,11 @@ def _parted(events: Sequence[LidEvent], smooth: Array, fps: float) -> list[tuple
     """Part blinks that touch at the widest opening between them."""
     parted = [(event, False) for event in events]
     for index, (first, second) in enumerate(pairwise(list(events))):
+        # They do not touch.
         if first.end_s < second.onset_s:
             continue
         between = smooth[first.frame : second.frame + 1]
+        # Next to each other or in a gap: there is no opening to part them at.
         if between.size < 3 or not np.isfinite(between).any():
             continue
         widest = (first.frame + int(np.nanargmax(between))) / fps
@@ -78,10 +81,13 @@ def _labelled(
     # A frame on either side of the deepest at least, whatever the fitted times round to.
     onset = max(0, min(round(event.onset_s * fps), event.frame - 1))
     end = min(smooth.size - 1, max(round(event.end_s * fps), event.frame + 1))
+    # At an end of the recording a side may be missing.
     if not onset < event.frame < end or not np.isfinite(smooth[onset : end + 1]).all():
         return None
+    # Between the edges only: an edge can be lower where a neighbor touches.
     lowest = onset + 1 + int(np.argmin(smooth[onset + 1 : end]))
     minimum = turning_frame(smooth, onset, lowest, end, options.minimum_tolerance)
+    # A phase of at least one frame on either side.
     return LabelledBlink(
         onset, max(onset + 1, min(minimum, end - 1)), end, event.depth, float("nan"), touches, event
     )
@@ -159,6 +165,7 @@ def blinks_of(
         labelled, refused = find_blinks(series.distance, series.fps, options, is_px=series.is_px)
     else:
         labelled, refused = recognised_blinks(series, recognised, options)
+    # Reviews name a blink by its minimum, which does not move with its edges.
     labelled = [_moved(series, blink, edges.get(blink.minimum)) for blink in labelled]
     measured, flat = measure_blinks(
         series, labelled, options, closed_distance=closed_distance, complete_from=complete_from
@@ -173,6 +180,7 @@ def _moved(series: BlinkSeries, blink: LabelledBlink, edges: tuple[int, int] | N
     last = series.distance.size - 1
     if end > last:
         raise InputError(f"the review ends a blink of {series.column} at frame {end}; the last is {last}")
+    # The profile would have to invent what lies in the gap.
     if not np.isfinite(series.distance[onset : end + 1]).all():
         raise InputError(
             f"the review moves a blink of {series.column} ({onset} to {end}) over frames without a value"
@@ -196,6 +204,7 @@ def _why_none(eye: EyeBlinks, options: LabelOptions) -> str:
         more = f"{counted(len(eye.refused), 'dip')} could not be measured; the first is"
         return f"{more} at frame {first.minimum}: {first.reason}"
     others = Counter(event.kind.replace("_", " ") for event in eye.events if event.kind != "blink")
+    # The 90th percentile is the open eye, despite blinks.
     deepest = 1 - np.nanmin(eye.smooth) / max(float(np.nanquantile(eye.smooth, 0.9)), 1e-9)
     what = f"its deepest dip is {deepest:.0%} of the opening"
     if others:
@@ -213,6 +222,7 @@ def without_blinks(eyes: Sequence[EyeBlinks]) -> list[str]:
 def rate_doubts(eyes: Sequence[EyeBlinks]) -> list[str]:
     """Lines about a rate at which the classifier was not tested, and one by which blinks do not last so."""
     fps, lines = eyes[0].series.fps, []
+    # The paper's rule scales with any rate.
     if eyes[0].recognised is not None and not TESTED_FPS[0] <= fps <= TESTED_FPS[1]:
         lines.append(
             f"the classifier was tested at {TESTED_FPS[0]} to {TESTED_FPS[1]:,} frames per second, but this "
@@ -231,8 +241,10 @@ def _rate_doubt(eyes: Sequence[EyeBlinks]) -> str:
     if not blinks:
         return ""
     fps = eyes[0].series.fps
+    # Medians: single blinks may be anything.
     duration_ms = float(np.median([blink.duration_ms for blink in blinks]))
     closing_ms = float(np.median([blink.down_ms for blink in blinks]))
+    # Over the amplitude, since larger blinks are faster.
     speed = float(np.median([blink.peak_closing_velocity / blink.amplitude for blink in blinks]))
     # Under 60 fps the filter and the frames, not the lid, rule how fast a blink seems to be.
     slow = closing_ms > USUAL_CLOSING_MS[1] and (speed < USUAL_SPEED[0] or fps < TELLING_FPS)
@@ -262,6 +274,7 @@ def eye_profile(
         profile_id=f"{recording}-{eye or label or eye_blinks.series.column}-{blink.number:02d}",
         closure=np.round(closure, 6),
         minimum_index=minimum,
+        # The profile begins with the onset, so the minimum is as far from its first sample.
         down_frames=minimum,
         up_frames=closure.size - 1 - minimum,
         amplitude=round(float(closure.max()), 6),

@@ -59,6 +59,7 @@ class LabelOptions:
     minimum_tolerance: float = 0.01
 
     def __post_init__(self) -> None:
+        # Two of the three are None where exactly one is given.
         if [self.gradient_peak, self.gradient_opening, self.gradient_px].count(None) != 2:
             raise InputError(
                 "use only one gradient limit: as a fraction of the peak, of the opening, or in pixels per "
@@ -66,6 +67,7 @@ class LabelOptions:
             )
         for name, value in vars(self).items():
             least = "0 or more" if name == "minimum_tolerance" else "greater than 0"
+            # Written so that NaN is refused as well.
             if value is not None and not (value > 0 or (value == 0 and least == "0 or more")):
                 raise InputError(f"{name.replace('_', '-')} must be {least}, got {value:g}")
         for name in ("gradient_peak", "minimum_depth", "minimum_tolerance"):
@@ -122,8 +124,10 @@ def turning_frame(smooth: Array, onset: int, lowest: int, end: int, tolerance: f
     amplitude = open_level - float(smooth[lowest])
     if tolerance == 0 or amplitude <= 0:
         return lowest
+    # Both flanks run away from the bottom.
     sides = (smooth[onset : lowest + 1][::-1], smooth[lowest : end + 1])
     reach = np.array([[_first_above(side, smooth[lowest] + p * amplitude) for p in FLANK] for side in sides])
+    # A blink that begins or ends half shut has only one flank.
     if not np.isfinite(reach).all():
         return lowest
     closing, opening = np.diff(reach, axis=1)[:, 0]
@@ -137,6 +141,7 @@ def turning_frame(smooth: Array, onset: int, lowest: int, end: int, tolerance: f
 def _first_above(values: Array, level: float) -> float:
     """Place, between frames, where `values` first rises through a level; NaN where it does not."""
     above = np.flatnonzero(values > level)
+    # Already above at its first value: there is no passage to find.
     if not above.size or above[0] == 0:
         return float("nan")
     after = int(above[0])
@@ -202,6 +207,7 @@ def find_blinks(
     blinks: list[LabelledBlink] = []
     refused: list[RefusedMinimum] = []
     for start, stop in runs(np.isfinite(distance)):
+        # Shorter pieces have no frame whose filter and gradient are both whole.
         if stop - start > scaled_frames(options.gradient_frames + options.filter_frames, fps) + 2:
             piece = _Piece(distance[start:stop], fps, options, is_px=is_px)
             labelled, lost = piece.label(offset=start)
@@ -216,6 +222,7 @@ class _Piece:
     def __init__(self, distance: Array, fps: float, options: LabelOptions, *, is_px: bool) -> None:
         self.smooth = box_filter(distance, scaled_frames(options.filter_frames, fps))
         self.opening = _local_opening(self.smooth, round(scaled_frames(options.search_frames, fps)))
+        # Smoothed twice: noise of single frames would never look like rest.
         gradient = box_filter(np.gradient(self.smooth), scaled_frames(options.gradient_frames, fps))
         # Per frame of 300 fps, as the limits are.
         self.steps = np.abs(gradient) * (fps / PAPER_FPS)
@@ -229,11 +236,13 @@ class _Piece:
         blinks: list[LabelledBlink] = []
         refused: list[RefusedMinimum] = []
         for index, minimum in enumerate(minima):
+            # Edges are looked for up to the next minimum on either side.
             before = minima[index - 1] if index else None
             after = minima[index + 1] if index + 1 < len(minima) else None
             baseline = self._baseline(minimum)
             onset, onset_touches = self._edge(minimum, before, baseline, step=-1)
             end, end_touches = self._edge(minimum, after, baseline, step=1)
+            # The recording or the search ends before the eye rests.
             if onset is None or end is None:
                 side = "before" if onset is None else "after"
                 refused.append(RefusedMinimum(minimum + offset, f"the eye does not come to rest {side} it"))
@@ -255,11 +264,13 @@ class _Piece:
         relative = self.smooth / self.opening
         depth = self.options.minimum_depth
         # Minima are peaks of -r, and -r >= depth - 1 says that r has fallen by `depth`.
+        # Half the depth as prominence: a ripple at the bottom is not a second blink.
         minima, _ = find_peaks(-relative, height=depth - 1, prominence=depth / 2)
         return [int(minimum) for minimum in minima]
 
     def _baseline(self, minimum: int) -> float:
         first = max(0, minimum - self.baseline_reach)
+        # Blinks are part of the mean, as in the paper: rest lies above it.
         return float(self.smooth[first : minimum + self.baseline_reach + 1].mean())
 
     def _edge(
@@ -282,6 +293,7 @@ class _Piece:
             return reached, False
         if reached is not None and abs(reached - minimum) < abs(neighbour - minimum):
             return reached, False
+        # Not at rest before the neighbor: the blinks meet where the eye is widest.
         between = np.arange(minimum + step, neighbour, step)
         return int(between[np.argmax(self.smooth[between])]), True
 
@@ -290,11 +302,13 @@ class _Piece:
         options = self.options
         if options.gradient_peak is not None:
             between = frames.size if neighbour is None else abs(neighbour - int(frames[0]))
+            # Not beyond the neighbor, whose faster phase would raise the limit.
             phase = frames[: max(1, min(between, self.baseline_reach))]
             return options.gradient_peak * float(self.steps[phase].max())
         if options.gradient_opening is not None:
             return options.gradient_opening * self.opening[windows]
         limit_px = float(options.gradient_px or 0.0)
+        # A series in other units is taken as if its opening had so many pixels.
         return limit_px if self.is_px else limit_px / options.opening_px * self.opening[windows]
 
 

@@ -51,27 +51,32 @@ def tracked_lower_lid(table: pd.DataFrame, column: str) -> tuple[Array, Array] |
     up_mm, nasal_mm : (n,) float64 arrays
         From an arbitrary origin; NaN on frames without a fit.
     """
+    # A track numbers points from 1, the image-left eye first.
     first = 10 if column == "right_distance_px" else 1
     names = [f"{axis}{point:02d}" for point in range(first, first + 9) for axis in "xy"]
     if not set(names) <= set(table.columns):
         return None
     points = table[names].to_numpy(dtype=np.float64).reshape(-1, 9, 2)
+    # Frames without a fit have empty cells.
     known = np.isfinite(points).all(axis=(1, 2))
     if not known.any():
         return None
     axis = np.median(points[known, _INNER_CANTHUS] - points[known, _OUTER_CANTHUS], axis=0)
     length_px = float(np.hypot(*axis))
+    # From the outer to the inner canthus.
     nasal = axis / max(length_px, 1e-9)
     # Square to the axis; which of both directions is up depends on the side of the nose.
     upwards = np.array([nasal[1], -nasal[0]]) * (1.0 if nasal[0] >= 0 else -1.0)
     lid_mm = points[:, _LOWER_LID].mean(axis=1) * FISSURE_LENGTH_MM / max(length_px, 1e-9)
     up_mm, nasal_mm = lid_mm @ upwards, lid_mm @ nasal
+    # A lower lid slides to the nose when the eye closes; a close-up may be turned the other way.
     if column == "distance_px" and _moves_back(nasal_mm[known], table.loc[known, column].to_numpy()):
         nasal_mm = -nasal_mm
     return up_mm, nasal_mm
 
 
 def _moves_back(place_mm: Array, distance: Array) -> bool:
+    # Halfway between least and greatest distance.
     shut = distance < (distance.min() + distance.max()) / 2
     if not shut.any():
         return False
@@ -128,6 +133,7 @@ def box_filter(values: Array, width_frames: float) -> Array:
     at 300 fps stay 33 ms at any rate. Ends are averaged over the part of the window that exists.
     """
     reach = int(np.ceil((width_frames - 1) / 2))
+    # At a low rate the window is a single frame.
     if reach <= 0:
         return values.copy()
     # The part of each outermost sample that the window covers.
@@ -155,11 +161,13 @@ def make_series(
     Gaps of `unseen` frames (n,), which are known not to have been seen, are never refused.
     """
     values = _known_values(table, column, fps, path)
+    # In time, not frames: what a lid can do in a gap depends on its length.
     reach = round(MAX_BRIDGED_MS * fps / 1000)
     filled, bridged = bridge_gaps(values, reach)
     missing = np.isnan(filled)
     is_track = column in DISTANCE_COLUMNS and "status" in table.columns
     if not (is_track if allow_gaps is None else allow_gaps):
+        # Frames that the table itself calls invalid need no excuse.
         _refuse_gaps(missing & ~unseen, table, column, path)
     lid = tracked_lower_lid(table, column) if column in DISTANCE_COLUMNS else None
     up, nasal = (None, None) if lid is None else (bridge_gaps(coordinate, reach)[0] for coordinate in lid)
@@ -167,6 +175,7 @@ def make_series(
         distance=filled,
         fps=fps,
         column=column,
+        # Names of tracks end in the unit; other columns may be ratios.
         is_px=column.endswith("_px"),
         bridged_frames=bridged,
         missing_frames=int(missing.sum()),
@@ -179,6 +188,7 @@ def _known_values(table: pd.DataFrame, column: str, fps: float, path: Path) -> A
     """(n,) values, NaN where there is none; InputError where they are too few, or no distances."""
     values = _numbers(table, column, path)
     values = np.where(np.isfinite(values), values, np.nan)
+    # One second at any rate: levels of an open eye cannot be found in less.
     if values.size < scaled_frames(300, fps):
         raise InputError(
             f"{path.name}: {values.size} frames at {fps:g} fps are less than one second, which is too short"
@@ -199,6 +209,7 @@ def _refuse_gaps(gaps: NDArray[np.bool_], table: pd.DataFrame, column: str, path
         return
     first = int(np.argmax(gaps))
     start = f"line {line_of(path, first)}"
+    # After resampling rows are no longer lines of the file.
     if RESAMPLED in table.attrs:
         start = f"{table['time_s'].iloc[first]:.3f} s"
     rest = gaps[first:]
@@ -232,11 +243,13 @@ def read_series(
     `resample` brings uneven times to even ones first. `inverted` says whether high is shut (`opening_of`).
     """
     table, times_note = read_table(path), ""
+    # A rate that was given wins over times in the file.
     if fps is None or resample:
         table, times_note = with_time_s(table, path)
     elif "time_s" not in table.columns:
         refuse_other_rate(table, fps, path)
     chosen, left_out = choose_columns(table, columns, path)
+    # Without times nothing shows how uneven they are.
     if resample and "time_s" not in table.columns:
         raise InputError(f"{path.name} has no column time_s: --resample needs the time of every frame")
     if not resample and TIMES in table.attrs and are_uneven(table):
@@ -277,6 +290,7 @@ def _set_openings(
     times_s = np.arange(len(table)) / fps
     if "time_s" in table.columns:
         times_s = table["time_s"].to_numpy(dtype=np.float64) - float(table["time_s"].iloc[0])
+    # After all columns have lost their -1, since the other eye's top counts for both.
     for column in chosen:
         same_kind = [
             one for name, one in given.items() if is_high_when_shut(name) == is_high_when_shut(column)
@@ -285,6 +299,7 @@ def _set_openings(
         table[column], lost = without_what_is_not_measured(
             opening, fps, times_s, column, path, turned=bool(note)
         )
+        # A gap that was explained is not refused later.
         unseen[column] = unseen[column] | (np.isfinite(opening) & table[column].isna().to_numpy())
         notes += [note, *lost]
     return notes
@@ -296,6 +311,7 @@ def _not_measured(values: Array) -> NDArray[np.bool_]:
     A column with other negative numbers is no such column.
     """
     negative = values < 0
+    # Without negative numbers `all` is true, and nothing is marked.
     return negative & bool((values[negative] == -1).all())
 
 

@@ -51,6 +51,7 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
     if "profile_id" in table.columns:
         return read_profile_table(path)
     if "closure" not in table.columns:
+        # Names that are known mean something else and are not misspelled.
         near = nearest("closure", [str(name) for name in table.columns if name not in COLUMNS], NEAR)
         hint = f"did you mean '{near}'?" if near else FORMATS
         raise InputError(f"{path.name}: no column 'closure'; {hint}")
@@ -62,6 +63,7 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
         if name.startswith("closure"):
             _require_closure(path, name, values)
     minimum = int(np.argmax(closure))
+    # Otherwise half a blink, whose other half would jump.
     if not 0 < minimum < len(closure) - 1:
         raise InputError(
             f"{path.name}: the greatest closure must be inside the blink, but it is sample {minimum + 1} of "
@@ -76,6 +78,7 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
             up_frames=len(closure) - 1 - minimum,
             amplitude=float(np.ptp(closure)),
             source=f"file {path.name}",
+            # One curve without a name may be of either eye.
             eye="both" if "closure_other" in signals else None,
             closure_other=signals.get("closure_other"),
             lower_up_mm=signals.get("lower_up_mm"),
@@ -142,8 +145,10 @@ def exemplar(
         Folder that profile files are relative to.
     """
     profile, repeated = _blink(settings, family, number, seed, beside)
+    # Textbook curves are made at the declared length.
     if settings.profile not in TEXTBOOK_KINDS:
         profile = of_declared_length(profile, settings)
+    # Alike: both eyes show the left curve.
     if settings.eyes == "alike" and profile.closure_other is not None:
         profile = replace(profile, closure_other=None)
     # As many onsets as samples begin within one frame: 10 at 30 fps, 12 at 24 and 25, 6 at 50, 5 at 60.
@@ -160,6 +165,7 @@ def of_declared_length(profile: BlinkProfile, settings: RenderSettings) -> Blink
 
 
 def _frames_30fps(settings: RenderSettings) -> float | None:
+    # Rounded to what a declaration can mean, free of binary rests.
     return None if settings.blink_ms is None else round(settings.blink_ms * 30 / 1000, 9)
 
 
@@ -177,6 +183,7 @@ def _in_turn(
     profiles: Sequence[BlinkProfile], count: int, seed: int, family: str
 ) -> list[tuple[BlinkProfile, bool]]:
     order = generator("recorded", seed, family).permutation(len(profiles))
+    # The order is drawn once by family, so a greater count keeps the first ones.
     return [(profiles[order[i % len(order)]], i >= len(order)) for i in range(count)]
 
 
@@ -186,8 +193,10 @@ def _blink(
     separate = settings.eyes == "separate"
     kind = settings.profile
     if kind == "real":
+        # The last of so many: this exemplar.
         return recorded_order(number, seed, family, paired=separate)[-1]
     if kind == "model":
+        # A separate stream for each exemplar: more of them leave the others as they are.
         rng = generator("model", seed, family, number)
         return (_paired_model() if separate else default_model()).sample(rng=rng), False
     if kind == "phases":
@@ -195,6 +204,7 @@ def _blink(
     for textbook in TEXTBOOK_KINDS:
         if kind == textbook:
             return _textbook(textbook, settings, family, number, seed), False
+    # No built-in name: the path of a file.
     profiles = read_closure_file(_path_next_to(kind, beside))
     if separate and any(profile.closure_other is None for profile in profiles):
         raise InputError(f"{kind}: eyes = 'separate' needs a column closure_other for the right eye")
@@ -206,6 +216,7 @@ def _textbook(
 ) -> BlinkProfile:
     """A textbook blink that begins and ends at rest, as recorded and modeled ones do (decision 0975)."""
     rng = generator("textbook", seed, family, number)
+    # Duration and closure of a recorded blink: only the shape is from the textbook.
     recorded = load_library()[int(rng.integers(len(load_library())))]
     peak = 1.0 if settings.amplitude == "full" else float(recorded.closure.max())
     duration = _frames_30fps(settings) or recorded.duration_frames_30fps
@@ -222,6 +233,7 @@ def _drawn_by_phases(family: str, number: int, seed: int, separate: bool) -> Bli
     return _phase_model().sample(None, rng, profile_id=f"phases-{seed}-{family}-{number}")
 
 
+# Fitted once for all exemplars of a build.
 @lru_cache(maxsize=1)
 def _phase_model() -> PhaseModel:
     return PhaseModel.fit(load_library())

@@ -32,6 +32,7 @@ ALIKE_LEVELS = 3.0
 """Pictures are alike where less than this share of the pixels about the eyes differs by more gray levels than
 these. A codec's own changes stay below it but for the first frames; two people and the actor, as recorded and
 compressed down to CRF 40, are like an earlier frame of theirs for 0.2 s at most."""
+# A change of the frame rate repeats single frames, for a tenth of a second at most.
 EVEN_RUN_S = 0.1
 EVEN_REPEATS = 4
 EVEN_SHARE = 0.9
@@ -53,6 +54,7 @@ class Hindsight:
         self._window = Stillness(fps).window
         self._stood = max(STOOD_FRAMES, round(STOOD_S * fps))
         self._longest = max(1, round(EVEN_RUN_S * fps))
+        # A reduced picture averages pixels, which shrinks their differences.
         self._levels = max(1, round(ALIKE_LEVELS / reduction))
         self._reduction = reduction
         self._first: Picture | None = None
@@ -69,6 +71,7 @@ class Hindsight:
         if frame.reason == FROZEN:
             self._repeats.append(self._count)
         self._count += 1
+        # All frames of the run so far, then each further one.
         if self._run == self._stood:
             self._doubt(self._run)
         elif self._run > self._stood:
@@ -88,6 +91,7 @@ class Hindsight:
             around = widths(frame.points)
             box = np.array([frame.points.min(0) - around, frame.points.max(0) + around])
             self._part = _slices(reduced_points(box, self._reduction), picture)
+            # A copy: the decoder uses its pictures again.
             self._first = picture[self._part].copy()
 
     def _like_first(self, picture: Picture) -> bool:
@@ -99,6 +103,7 @@ class Hindsight:
         """Make the last frames doubtful that no more has been said of."""
         for back in range(1, min(count, len(self._held)) + 1):
             frame = self._held[-back]
+            # A frame that was lost or doubtful for another reason keeps that.
             if frame.status in ("tracked", "reinitialised") or frame.reason in (FROZEN, STILL):
                 self._held[-back] = replace(frame, status="doubtful", reason=STOOD)
 
@@ -108,6 +113,7 @@ class Hindsight:
         oldest = self._count - 2 * self._window
         while self._repeats and self._repeats[0] < oldest:
             self._repeats.popleft()
+        # Even repeats are a property of the file, not a frozen camera.
         if frame.reason == FROZEN and evenly_repeated(list(self._repeats), self._longest):
             self.repeated += 1
             frame = self._as_before(frame)
@@ -119,6 +125,7 @@ class Hindsight:
         earlier = self._earlier
         if earlier is None or earlier.status == "lost":
             return repeat
+        # The repeat itself was not found again.
         status = "tracked" if earlier.status == "reinitialised" else earlier.status
         return replace(repeat, status=status, reason=earlier.reason)
 
@@ -151,9 +158,11 @@ def evenly_repeated(repeats: list[int], longest: int) -> bool:
         return False
     steps = np.diff(repeats)
     apart = np.flatnonzero(steps > 1)
+    # Lengths of runs of repeats without a gap between them.
     runs = np.diff(np.concatenate([[-1], apart, [len(steps)]]))
     if runs.max() > longest:
         return False
+    # The usual step, and one to each side of it: rates seldom divide evenly.
     least = int(np.median(steps))
     return any(np.isin(steps, (step, step + 1)).mean() >= EVEN_SHARE for step in (least - 1, least))
 
@@ -168,6 +177,7 @@ def pictures_alike(one: Picture, other: Picture, levels: int, share: float) -> b
             # sums, as a difference of unsigned levels would wrap around
             low, high = min(one[row, column], other[row, column]), max(one[row, column], other[row, column])
             count += high > low + levels
+        # A row at a time: enough, and cheaper than a test for each pixel.
         if count > allowed:
             return False
     return True
@@ -208,6 +218,7 @@ def track_video(
     with threadpool_limits(1, "blas"), TrackWriter(out, model.eyes) as writer:
         pictures = frames(info.path, lambda full: reduce_picture(full, model.reduction))
         for number, picture in enumerate(islice(pictures, info.frame_count)):
+            # Time of this thread: decoding in other threads does not count as fitting.
             before = time.thread_time()
             hint = hints.get(number)
             if hint is not None:
@@ -222,6 +233,7 @@ def track_video(
         if advance is not None:
             advance(summary)
         summary.repeated = hindsight.repeated
+        # Inside the writer's block: a refusal removes the unfinished table.
         _refuse_nothing(info, summary)
     summary.total_s = time.perf_counter() - begun
     return summary
@@ -231,6 +243,7 @@ def _write(
     known: Iterable[TrackedFrame], info: VideoInfo, writer: TrackWriter, summary: TrackSummary
 ) -> None:
     for frame in known:
+        # Frames come in order, so the count is the number of the next one.
         writer.write(summary.frames, float(info.times_s[summary.frames]), frame)
         summary.count(frame)
 
