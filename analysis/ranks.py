@@ -15,6 +15,7 @@ from experiments.errors import InputError
 Floats = NDArray[np.float64]
 DRAWS = 2000
 """Draws of participants for the interval of an effect size."""
+# Fixed, so that a report repeats its intervals.
 SEED = 53
 Bounds = tuple[float, float] | None
 Side = Literal["two-sided", "greater", "less"]
@@ -127,8 +128,10 @@ def rank_within(factor: str, levels: Sequence[str], values: Floats, bounds: Boun
     people, count = values.shape
     if count < 2 or people < 2:
         raise InputError(f"'{factor}': expected two levels and two participants, got {count} and {people}")
+    # Ranks without any difference divide by 0 in Friedman's test.
     if np.all(values == values[:, :1]):
         raise InputError(f"'{factor}': every participant rates all levels alike; there is nothing to rank")
+    # Within each participant, ties as mean ranks.
     ranks = np.apply_along_axis(stats.rankdata, 1, values)
     test = RankTest("Friedman", *_friedman(ranks), *_kendall_w(ranks))
     pairs = [
@@ -211,6 +214,7 @@ def rank_between(
     together = np.concatenate(list(groups))
     if np.all(together == together[0]):
         raise InputError(f"'{factor}': all values are alike; there is nothing to rank")
+    # Over all participants together, which Dunn and Conover need.
     ranks = _split(stats.rankdata(together), [len(group) for group in groups])
     chi2 = float(stats.kruskal(*groups).statistic)
     df = len(groups) - 1
@@ -259,10 +263,12 @@ def _kendall_w(ranks: Floats) -> tuple[float, float, float]:
 def _signed_ranks(first: str, second: str, differences: Floats, bounds: Bounds) -> RankPair:
     changed = differences[differences != 0]
     low, high = _interval([differences], lambda drawn: _signed_biserial(drawn[0]))
+    # Shifted by a bound, the same test asks whether differences lie beyond it.
     equal = _equivalent(bounds, lambda bound, side: _wilcoxon(differences - bound, side)[0])
     if len(changed) == 0:
         alike = RankPair(first, second, len(differences), 0.0, False, 1.0, 1.0, 1.0, 0.0, low, high)
         return replace(alike, p_equivalence=equal)
+    # Zeros are left out, as Wilcoxon does (and R).
     v = float(stats.rankdata(np.abs(changed))[changed > 0].sum())
     p, exact = _wilcoxon(differences)
     return RankPair(
@@ -272,6 +278,7 @@ def _signed_ranks(first: str, second: str, differences: Floats, bounds: Bounds) 
         v,
         exact,
         p,
+        # Corrections need all pairs; `_corrected` fills them in.
         np.nan,
         np.nan,
         _signed_biserial(differences),
@@ -377,6 +384,7 @@ def _conover_within(ranks: Floats) -> Conover:
     people, count = ranks.shape
     sums, df = ranks.sum(axis=0), (people - 1) * (count - 1)
     error = 2 * (people * float((ranks**2).sum()) - float((sums**2).sum())) / df
+    # All rank alike: every difference of ranks would be infinitely sure.
     if error <= 1e-9:
         return None
     return [float(sums[a] - sums[b]) / error**0.5 for a, b in combinations(range(count), 2)], df
@@ -386,6 +394,7 @@ def _conover_between(ranks: Sequence[Floats], chi2: float) -> Conover:
     # Conover and Iman (1979): Dunn's error, less the part of the ranks' variance that the groups explain.
     every, count = np.concatenate(list(ranks)), len(ranks)
     df = len(every) - count
+    # At least 1 df, as the check below comes after the division.
     left = float(every.var(ddof=1)) * (len(every) - 1 - chi2) / max(df, 1)
     if df < 1 or left <= 1e-9:
         return None
@@ -408,6 +417,7 @@ def _interval(groups: Sequence[Floats], size: Callable[[list[Floats]], float]) -
     # Participants are the rows of a group, so the same draw serves values, differences and rows of ranks.
     random = np.random.default_rng(SEED)
     draws = [size([random.choice(group, len(group)) for group in groups]) for _ in range(DRAWS)]
+    # Percentiles: effect sizes are bounded, and their draws skewed.
     low, high = np.quantile(draws, (0.025, 0.975))
     return float(low), float(high)
 

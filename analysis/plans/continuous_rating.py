@@ -27,6 +27,7 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
     """Reject a trace that is not a list of numbers within the declared range."""
     trial = continuous_rating_of(experiment)
     for position, text in enumerate(rows["trace"].astype(str)):
+        # A trial without an answer has no trace.
         if text in ("", "nan") or _is_trace(text, trial):
             continue
         raise InputError(
@@ -43,6 +44,7 @@ def _is_trace(text: str, trial: ContinuousRating) -> bool:
     return (
         values.ndim == 1
         and values.size > 0
+        # NaN is in no range, so it is refused as well.
         and bool(((values >= trial.minimum) & (values <= trial.maximum)).all())
     )
 
@@ -64,18 +66,22 @@ def clips_of(prepared: PlanRows) -> list[ClipTraces]:
     clips = []
     rows = prepared.rows
     rates = rows["clip_fps"].to_numpy(dtype=float) / rows["step_frames"].to_numpy(dtype=float)
+    # Rounded, since equal rates may differ in their last bits.
     if len(np.unique(np.round(rates[np.isfinite(rates)], 6))) > 1:
         raise InputError(
             f"{prepared.source}: expected traces with one sampling rate, got several; analyze clips of one "
             "frame rate at a time"
         )
+    # By file as well: traces are aligned with the blinks of one clip.
     for (cell, clip), mine in rows.assign(rate_hz=rates).groupby(["cell", "clip_sha256"], observed=True):
         given = mine[~mine["trace"].astype(str).isin(("", "nan"))]
         traces = [json.loads(str(text)) for text in given["trace"]]
         if not traces:
             continue
+        # The shortest trace of a clip decides: a mean needs a value of everybody.
         samples = min(map(len, traces))
         blinks = str(mine["blinks_s"].iloc[0])
+        # A clip without known blinks has no list here.
         events = tuple(json.loads(blinks)) if blinks.startswith("[") else ()
         values = np.array([trace[:samples] for trace in traces], dtype=float)
         people = tuple(given["participant"].astype(str))

@@ -58,6 +58,7 @@ def pooled(
         A series or version that the rows do not have.
     """
     said: list[str] = []
+    # What was asked for first: the default origin is that of the rows which remain.
     rows = _of_number(rows, VERSION, pool.version, source, said)
     rows = _of_number(rows, SERIES, pool.series, source, said)
     rows = _of_origin(rows, pool.origin, said)
@@ -78,6 +79,7 @@ def _series_of(rows: pd.DataFrame, declaration_sha256: str) -> int | None:
         return None
     series = rows[SERIES]
     if DECLARATION in rows.columns:
+        # Answers under this very declaration fit its analysis plan best.
         own = _numbers(series[(rows[DECLARATION] == declaration_sha256).to_numpy()])
         if own:
             return own[-1]
@@ -87,6 +89,7 @@ def _series_of(rows: pd.DataFrame, declaration_sha256: str) -> int | None:
 def _declarations(rows: pd.DataFrame, declaration_sha256: str) -> Iterator[str]:
     """What is to be said of the declarations under which these answers were given."""
     hashes = (
+        # Rows of older exports may have no hash.
         {str(name) for name in pd.unique(rows[DECLARATION])} - {""} if DECLARATION in rows.columns else set()
     )
     if len(hashes) > 1:
@@ -100,12 +103,14 @@ def _declarations(rows: pd.DataFrame, declaration_sha256: str) -> Iterator[str]:
 
 def origins(rows: pd.DataFrame) -> np.ndarray:
     """The origin of every row."""
+    # A column that is empty throughout says nothing.
     if "run_origin" in rows.columns and not (rows["run_origin"] == "").all():
         return np.asarray(rows["run_origin"], dtype=object)
     origin = np.full(len(rows), Origin.PARTICIPANT.value, dtype=object)
     if "phase" in rows.columns:
         origin[(rows["phase"] == "pilot").to_numpy()] = Origin.PILOT.value
     if "synthetic" in rows.columns:
+        # Last: synthetic answers may be marked as of a pilot, too.
         origin[rows["synthetic"].to_numpy(dtype=bool)] = Origin.SIMULATED.value
     return origin
 
@@ -117,6 +122,7 @@ def _of_origin(rows: pd.DataFrame, chosen: Origin | None, said: list[str]) -> pd
         if len(there) > 1:
             said.append(f"responses of {len(there)} origins were pooled: {', '.join(there)}")
         return rows
+    # The order of `Origin`: participants before pilots before simulations.
     origin = chosen or (there[0] if there else Origin.PARTICIPANT)
     mine = origin_of_row == origin.value
     if not mine.all():
@@ -135,8 +141,10 @@ def _of_number(
         raise InputError(f"{source} does not record the {what} of its rows; do not choose one")
     if chosen not in there:
         raise InputError(f"{source} has no responses of {what} {chosen}; it has {_known(rows)}")
+    # Nothing is left aside, so nothing is said.
     if len(there) == 1:
         return rows
+    # As text, since a column with empty cells holds no whole numbers.
     mine = (rows[column].astype(str) == str(chosen)).to_numpy()
     said.append(f"{what} {chosen}: {(~mine).sum()} other rows were ignored")
     return rows[mine]
@@ -145,6 +153,7 @@ def _of_number(
 def _known(rows: pd.DataFrame) -> str:
     """The series of these rows with their versions, in words."""
     if VERSION not in rows.columns or SERIES not in rows.columns:
+        # A table may have only one of the two columns.
         column = VERSION if VERSION in rows.columns else SERIES
         return f"{column.replace('_', ' ')} {', '.join(map(str, _numbers(rows[column])))}"
     groups = rows[[SERIES, VERSION]].drop_duplicates().groupby(SERIES)[VERSION]

@@ -72,7 +72,7 @@ def sizes(analysis: Analysis, names: Names) -> dict[str, Any]:
 
 
 def _effect(effect: Effect, names: Names) -> list[str]:
-    # None of a test with one contrast: its univariate F is exact already.
+    # None without error, with a singular one, or with fewer df than contrasts.
     several = effect.multivariate
     exact = several is not None and several.exact and bool(effect.within)
     numbers = [effect.eta_sq_partial, effect.omega_sq_partial, *effect.eta_sq_partial_ci]

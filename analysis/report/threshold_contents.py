@@ -217,7 +217,7 @@ def curve(fit: Threshold, x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Share of positive answers at each x by the fitted function."""
     # The spread is fitted as a logarithm, which keeps it above 0.
     rise = function(fit.shape, x, fit.threshold, float(np.log(fit.spread)))
-    # Where high stimuli are hard (falling), the function is mirrored, guess and lapse are not.
+    # Where answers fall along the stimulus the function is mirrored; guess and lapse stay.
     share: NDArray[np.float64] = fit.guess + (1 - fit.guess - fit.lapse) * (1 - rise if fit.falling else rise)
     return share
 

@@ -265,7 +265,7 @@ def with_wishes(
         "invented_means": tuple(
             m
             for m in published.invented_means
-            # An invented mean gives way to a wish about the same place or a part of it.
+            # An invented mean gives way to wishes about its factors, alone or with others.
             if not any(set(m.at) <= set(p) for p in places) and not any(g <= set(m.at) for g in gone)
         ),
     }

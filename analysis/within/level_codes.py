@@ -12,6 +12,7 @@ from experiments.errors import InputError, did_you_mean
 
 Integers = NDArray[np.int64]
 
+# No exponents: 1e5 may be a name.
 _NUMBER = re.compile(r"[+-]?[0-9]+(\.[0-9]+)?")
 
 _EXACT = 2**53
@@ -21,6 +22,7 @@ _EXACT = 2**53
 def natural_order(names: Sequence[str]) -> list[str]:
     """Sort names: by value where all are numbers, else by text without case; independent of row order."""
     if all(_NUMBER.fullmatch(name) for name in names):
+        # The text as well, so that 1 and 1.0 have one order.
         return sorted(names, key=lambda name: (float(name), name))
     return sorted(names, key=lambda name: (name.casefold(), name))
 
@@ -45,9 +47,11 @@ def level_codes(
     InputError
         A row without a value; a value that is not declared.
     """
+    # Whole numbers are counted, which is faster than hashing.
     if declared is None and (counted := _whole_numbers(column)) is not None:
         return counted
     codes, uniques = factorize_column(column)
+    # Missing values have the code -1.
     if codes.min() < 0:
         raise InputError(f"'{name}' is empty in row {int(np.argmin(codes)) + 1}; every row needs one")
     texts = [str(text) for text in uniques]
@@ -57,6 +61,7 @@ def level_codes(
         if text not in position:
             raise InputError(f"'{text}' is not a level of '{name}'{did_you_mean(text, names)}")
     lookup = np.array([position[text] for text in texts], dtype=np.int64)
+    # By value and not by row: a few levels, but maybe a million rows.
     return lookup[codes], names
 
 
@@ -105,6 +110,7 @@ def given_orders(
     for text in given:
         name, equals, listed = text.partition("=")
         name = name.strip()
+        # A bar where levels hold commas.
         order = [level.strip() for level in listed.split("|" if "|" in listed else ",")]
         if not equals or not all(order):
             raise InputError(f"--levels should be like time=before,after,later, got '{text}'")
@@ -116,6 +122,7 @@ def given_orders(
                 raise InputError(
                     f"--levels: '{level}' is not a level of '{name}'{did_you_mean(level, there)}"
                 )
+        # All levels once: an order of some would leave the others without a place.
         lacking = [level for level in there if level not in order]
         if lacking or len(set(order)) < len(order):
             named = f"; {', '.join(lacking)} missing" if lacking else ""
@@ -141,10 +148,12 @@ def _whole_numbers(column: pd.Series) -> tuple[Integers, list[str]] | None:
         return None
     values = column.to_numpy()
     low, high = int(values.min()), int(values.max())
+    # A range wider than the table would take more memory than hashing.
     if high - low >= len(values) or max(-low, high) >= _EXACT:
         return None
     codes = values.astype(np.int64, copy=False) - low
     present = np.flatnonzero(np.bincount(codes))
+    # Gaps in the range are closed, so that codes count the levels that occur.
     if len(present) <= high - low:
         lookup = np.zeros(high - low + 1, np.int64)
         lookup[present] = np.arange(len(present))

@@ -409,7 +409,7 @@ class PlaybackLog(BaseModel):
     )
 
 
-# The answer itself is not here: a value that the participant chose is never made unknown.
+# Of the answer only measured parts: a value that the participant chose is never made unknown.
 _MEASURED: dict[Path, Any] = {
     **{(name,): None for name in ("rt", "rt_from_first_frame", "time_elapsed", "answered_at_client")},
     ("changes",): LEFT_OUT,

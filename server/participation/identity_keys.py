@@ -25,6 +25,7 @@ from experiments.errors import InputError
 
 PURPOSE = b"palpebra identity keys"
 HASH_PURPOSE = "duplicates"
+# AES-256, and the nonce length that GCM is made for.
 KEY_BYTES, NONCE_BYTES = 32, 12
 
 
@@ -74,6 +75,7 @@ def identifier_hash(study_key: str, identifier: str) -> str:
     """HMAC-SHA-256 of a recruiter's id under the study's key; empty for none."""
     if not identifier:
         return ""
+    # Surrogates: an address may hold bytes that are not UTF-8, and they are part of the id.
     named = f"{HASH_PURPOSE}:{identifier}".encode("utf-8", "surrogatepass")
     return hmac.digest(bytes.fromhex(study_key), named, hashlib.sha256).hex()
 
@@ -81,6 +83,7 @@ def identifier_hash(study_key: str, identifier: str) -> str:
 # Decision 0740: One key per recruiter id, and no key in a backup.
 def seal(secret: bytes, run: str, known_as: ParticipantIdentity) -> Sealed:
     """Encrypt under a new key; `secret` is the installation's key, `run` the run's public id."""
+    # A new key for each run: a random nonce is then never used twice with it.
     key, nonce = AESGCM.generate_key(KEY_BYTES * 8), os.urandom(NONCE_BYTES)
     plain = json.dumps({"identifier": known_as.identifier, "parameters": dict(known_as.parameters)})
     # The run is associated data: content that is moved to another run's row does not open.
@@ -101,6 +104,7 @@ def unseal(secret: bytes, run: str, sealed: Sealed) -> ParticipantIdentity:
         content = base64.b64decode(sealed.content)
         nonce, encrypted = content[:NONCE_BYTES], content[NONCE_BYTES:]
         plain = json.loads(AESGCM(key).decrypt(nonce, encrypted, run.encode()))
+    # One error for all causes, which callers treat alike.
     except (UnreadableError, InvalidTag, ValueError, binascii.Error) as error:
         raise UnreadableError(f"run {run}") from error
     return ParticipantIdentity(plain["identifier"], plain["parameters"])
@@ -137,6 +141,7 @@ def unwrap(secret: bytes, wrapped: str) -> bytes:
 
 
 def _wrapping_key(secret: bytes) -> bytes:
+    # `info` separates this key from others that are derived from the same secret.
     return HKDF(algorithm=SHA256(), length=KEY_BYTES, salt=None, info=PURPOSE).derive(secret)
 
 

@@ -33,6 +33,7 @@ def store_identity(
     without it of the id as it is written.
     """
     sealed = seal(session.info[SIGNING_KEY](), run.public_id, known_as)
+    # One person's id can be written in several ways; all should match.
     matched_by = known_as.identifier if identifier is None else identifier
     session.add(
         RecruiterIdentity(
@@ -41,6 +42,7 @@ def store_identity(
             sealed=sealed.content,
         )
     )
+    # A separate table, which backups leave out.
     session.add(IdentityKey(study_run_id=run.id, wrapped_key=sealed.wrapped_key))
 
 
@@ -60,6 +62,7 @@ def known_as(session: Session, run: StudyRun) -> ParticipantIdentity | None:
     """
     query = _with_keys().where(RecruiterIdentity.study_run_id == run.id)
     row = session.execute(query).one_or_none()
+    # No row: nothing was said, or its key is erased.
     return unseal(session.info[SIGNING_KEY](), row[0], Sealed(row[1], row[2])) if row else None
 
 
@@ -75,6 +78,7 @@ def same_person(session: Session, run: StudyRun) -> ColumnElement[bool] | None:
     """Which runs are under the recruiter's id of this one; None where the recruiter named nobody."""
     query = select(RecruiterIdentity.identifier_hash).where(RecruiterIdentity.study_run_id == run.id)
     known = session.scalar(query)
+    # An empty hash is of an address that named nobody, and matches nobody.
     if not known:
         return None
     return StudyRun.id.in_(
@@ -84,10 +88,12 @@ def same_person(session: Session, run: StudyRun) -> ColumnElement[bool] | None:
 
 def drop_key(session: Session, run: StudyRun) -> bool:
     """Erase the key of a run and what it opened; False where there was none. The keyed hash stays."""
+    # Before the deletion, which it changes.
     _overwrite_deleted(session)
     gone = delete(IdentityKey).where(IdentityKey.study_run_id == run.id).returning(IdentityKey.study_run_id)
     had = session.scalar(gone) is not None
     blank = update(RecruiterIdentity).where(RecruiterIdentity.study_run_id == run.id)
+    # The content too: without its key it is noise, but nobody must rely on that alone.
     session.execute(blank.values(sealed=""))
     return had
 
@@ -134,6 +140,7 @@ def rewrap_all(session: Session, old_secret: bytes) -> tuple[int, int]:
     for key in session.scalars(select(IdentityKey)):
         try:
             key.wrapped_key = rewrap(old_secret, secret, key.wrapped_key)
+        # Already under the new secret, or under a third one.
         except UnreadableError:
             left += 1
         else:

@@ -87,6 +87,7 @@ def counts_of(session: Session, runs: ColumnElement[bool]) -> Iterable[RunCounts
     query = select(
         StudyRun.id, StudyRun.version_id, StudyRun.excluded, RunTally.counts, RunTally.answers
     ).join(RunTally, RunTally.study_run_id == StudyRun.id)
+    # In portions: all answers at once would fill the memory.
     rows = session.execute(query.where(runs).execution_options(yield_per=READ_AT_ONCE))
     return (RunCounts._make(row) for row in rows)
 
@@ -95,17 +96,20 @@ def clips_of(session: Session, version: int) -> list[CellClip]:
     """The clips of a version but those of checks, by their ids."""
     query = select(VersionClip.id, VersionClip.cell, VersionClip.levels)
     query = query.where(VersionClip.version_id == version, VersionClip.cell != CHECK_CELL)
+    # By id: their numbers in tallies follow from this order.
     return [CellClip(*row) for row in session.execute(query.order_by(VersionClip.id))]
 
 
 def runs_after(session: Session, after: int) -> Sequence[int]:
     """The numbers of the next runs, previews too."""
+    # After a number and not by offset, so that new runs move no portion.
     query = select(StudyRun.id).where(StudyRun.id > after).order_by(StudyRun.id).limit(RUNS_AT_ONCE)
     return session.scalars(query).all()
 
 
 def shown_clips(session: Session, runs: Sequence[int]) -> list[ShownClip]:
     """Every play of these runs (ascending numbers) in order, one row per clip of its trial."""
+    # A range instead of a list: the numbers are ascending, and few others lie between.
     query = _SHOWN_PLAYS.where(Rating.study_run_id.between(runs[0], runs[-1]))
     return [ShownClip(*row) for row in session.execute(query)]
 
@@ -136,6 +140,7 @@ def lock_run(session: Session, run: int) -> None:
 
 def replace_tally(session: Session, run: int, tally: Tally | None) -> None:
     """Store a run's tally in the place of what there was; None for none."""
+    # Replaced, not changed: there may be none yet.
     session.execute(delete(RunTally).where(RunTally.study_run_id == run))
     if tally is not None:
         session.execute(insert(RunTally).values(study_run_id=run, **tally.values()))

@@ -47,6 +47,7 @@ def scale_doubt(series: BlinkSeries, scale: Scale | None) -> str:
     """A line where the usual opening in mm is none of a person's; empty otherwise."""
     if scale is None:
         return ""
+    # The open eye in spite of blinks, see `OPEN_PERCENTILE`.
     opening = float(np.nanpercentile(series.distance, OPEN_PERCENTILE)) * scale.mm_per_px
     if FISSURES_MM[0] <= opening <= FISSURES_MM[1]:
         return ""
@@ -68,6 +69,7 @@ def check_scale(scale: str) -> float | None:
         return None
     irises = iris_table(scale)
     if irises is not None:
+        # Only for its errors, before a long recording is read.
         _by_irises(irises)
         return None
     try:
@@ -79,6 +81,7 @@ def check_scale(scale: str) -> float | None:
             f"--scale {scale}: expected a number of mm per pixel, {rules}"
             + (f"; did you mean '{near}'?" if near else "")
         ) from None
+    # 10 mm per pixel would put a whole eye into three pixels.
     if not (np.isfinite(value) and 0 < value < 10):
         raise InputError(f"--scale must be a number of mm per pixel above 0 and below 10, got {scale}")
     return value
@@ -116,12 +119,14 @@ def _by_irises(path: Path) -> Scale:
     table = read_table(path)
     columns = [name for name in table.columns if name.endswith("iris_diameter_px")]
     diameters = table[columns].apply(pd.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
+    # A frame without an iris has 0 or nothing.
     seen = diameters[np.isfinite(diameters) & (diameters > 0)]
     if seen.size < LEAST_IRISES:
         raise InputError(
             f"--scale {IRIS_FILE}{path.name}: expected a table of stimuli iris with {LEAST_IRISES} irises or "
             f"more, got {seen.size}; measure them with stimuli iris VIDEO TRACK --out I.csv"
         )
+    # A column without any value is of an eye that was never seen.
     middles = [float(np.nanmedian(one)) for one in diameters.T if np.isfinite(one).any()]
     if max(middles) > MAX_IRIS_RATIO * min(middles):
         raise InputError(
@@ -129,6 +134,7 @@ def _by_irises(path: Path) -> Scale:
             f"{max(middles):.3g} px wide (medians), which is implausible for one face. Check the recording "
             "with stimuli track --preview, or give mm per pixel"
         )
+    # Irises vary least between people; the median ignores frames with half-covered ones.
     middle = float(np.median(seen))
     rule = f"an iris is {IRIS_MM:g} mm wide, {middle:.1f} px here (median of {seen.size:,} in {path.name})"
     return Scale(IRIS_MM / middle, rule)
@@ -150,6 +156,7 @@ def _by_rule(table: pd.DataFrame, rule: str, path: Path) -> Scale:
         length, true = np.hypot(*(points[:, 0, 5] - points[:, 0, 0]).T), FISSURE_LENGTH_MM
     if not np.isfinite(length).any():
         raise InputError(f"{path.name}: no frame has landmarks, so the scale cannot be computed")
+    # The median: heads turn, and single frames are wrong.
     return Scale(true / float(np.nanmedian(length)), SCALES[rule])
 
 
@@ -184,6 +191,7 @@ def write_lids(path: Path, eyes: Sequence[tuple[BlinkSeries, float]], scale: Sca
         "time_s": np.round(np.arange(first.distance.size) / first.fps, 6),
     }
     for series, closed in eyes:
+        # The unit in the name would be wrong for closure, mm and degrees.
         name = series.column.removesuffix("_px")
         columns[series.column] = np.round(series.distance, 4)
         columns[f"{name}_closure"] = np.round(closure_course(series, closed), 5)

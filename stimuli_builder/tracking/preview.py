@@ -23,6 +23,7 @@ PANEL_PX = 96
 SECONDS = 2.0
 MESH, OUTLINE, TEXT = (70, 150, 90), (90, 255, 120), (235, 235, 235)
 TRACES = ((90, 170, 255), (255, 180, 70))
+# OpenCV draws at fractions of a pixel when coordinates are shifted by so many bits.
 SHIFT = 4
 
 
@@ -34,6 +35,7 @@ def write_preview(
     The model gives the triangles; the track is read row by row, so memory does not grow with its length.
     """
     names, gaps = point_columns(model.eyes), distance_columns(model.eyes)
+    # Even, as yuv420p halves both sides for color.
     width, height = (side - side % 2 for side in info.size_px)
     span = max(2, round(SECONDS * info.fps))
     history: deque[NDArray[np.float64]] = deque(maxlen=span)
@@ -44,6 +46,7 @@ def write_preview(
             points = numbers(row, names, str(track)).reshape(-1, 2)
             history.append(numbers(row, gaps, str(track)))
             if np.isfinite(history[-1]).all():
+                # The scale only grows: a trace that jumps would hide the blinks.
                 top = max(top, float(history[-1].max()))
             canvas = np.zeros((height + PANEL_PX, width, 3), np.uint8)
             canvas[:height] = picture[:height, :width]
@@ -59,6 +62,7 @@ def _status(row: dict[str, str]) -> str:
 
 
 def _draw_mesh(canvas: Picture, points: Points, triangles: NDArray[np.int64]) -> None:
+    # Of a lost frame there is nothing to draw.
     if not np.isfinite(points).all():
         return
     vertices = _fixed(with_border(points))
@@ -78,10 +82,12 @@ def _fixed(points: Points) -> NDArray[np.int32]:
 def _draw_trace(panel: Picture, history: deque[NDArray[np.float64]], span: int, top: float) -> None:
     values = np.array(history)
     height, width = panel.shape[:2]
+    # The newest value is always at the right edge.
     x = (np.arange(len(values)) + span - len(values)) / (span - 1) * (width - 1)
     for eye in range(values.shape[1]):
         y = height - 8 - values[:, eye] / top * (height - 30)
         good = np.isfinite(y)
+        # A gap interrupts the line instead of being bridged.
         for part in np.split(np.arange(len(y)), np.flatnonzero(np.diff(good.astype(int))) + 1):
             if good[part[0]]:
                 cv2.polylines(
@@ -115,5 +121,6 @@ def plot_track(track: Path, fps: float, figure: Path) -> int:
         blinks_of(series, DEFAULT_OPTIONS, recognised=recognised)
         for series, recognised in zip(given, recognise(given), strict=True)
     ]
+    # No review yet, so nothing is rejected.
     save_figure(series_figure(eyes, set()), figure)
     return max(len(eye.blinks) for eye in eyes)

@@ -72,6 +72,7 @@ class TrackWriter:
 
     def __init__(self, path: Path, eyes: int):
         self._path, self._eyes = path, eyes
+        # A lost frame keeps its row, so that row numbers stay frame numbers.
         self._blank = [""] * (len(point_columns(eyes)) + eyes)
         self._stack = ExitStack()
 
@@ -86,6 +87,7 @@ class TrackWriter:
         if frame.points is None or frame.distances is None:
             cells = self._blank
         else:
+            # A thousandth of a pixel is below any tracking error.
             cells = [f"{value:.3f}" for value in (*frame.points.ravel().tolist(), *frame.distances.tolist())]
         residual = "" if frame.residual is None else f"{frame.residual:.3f}"
         self._writer.writerow(
@@ -102,6 +104,7 @@ class TrackWriter:
         )
 
     def _errors(self, frame: "TrackedFrame") -> list[str]:
+        # Errors are stated for all points or for none.
         if frame.errors is None or not np.isfinite(frame.errors).all():
             return [""] * (1 + EYE_POINTS * self._eyes)
         each = frame.errors.tolist()
@@ -126,6 +129,7 @@ def track_rows(path: Path) -> Iterator[dict[str, str]]:
 def numbers(row: dict[str, str], names: list[str], where: str) -> NDArray[np.float64]:
     """Cells of a row as numbers; NaN where a cell is empty because the frame is lost."""
     try:
+        # An empty cell is a lost frame, not an error.
         return np.array([float(row[name]) if row[name] else np.nan for name in names])
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
@@ -190,6 +194,7 @@ class TrackSummary:
     @property
     def fit_fps(self) -> float:
         """Frames fitted per second of fitting."""
+        # Before the first frame no time has passed.
         return self.frames / max(self.fit_s, 1e-9)
 
     @property
@@ -202,9 +207,11 @@ class TrackSummary:
         if frame.status in ("doubtful", "lost"):
             # Words before the first number or bracket: reasons that differ in figures alone are one kind.
             kind = (frame.status, re.split(r"[:(]|\d", frame.reason)[0].strip())
+            # The first frame of each kind is where a person looks.
             number, first, whole = self.reasons.get(kind, (0, self.frames, frame.reason))
             self.reasons[kind] = (number + 1, first, whole)
         self.frames += 1
+        # Doubtful and found-again frames have points, too.
         self.tracked += frame.status != "lost"
         self.doubtful += frame.status == "doubtful"
         self.reinitialised += frame.status == "reinitialised"

@@ -33,6 +33,7 @@ class Preference(Protocol):
 
 def asked_in(prompt: str) -> int:
     """The number that the prompt of an attention check asks for."""
+    # Stars are the bold type of Markdown.
     return next(int(word) for word in prompt.replace("*", " ").split() if word.isdigit())
 
 
@@ -71,6 +72,7 @@ A = TypeVar("A", bound=Answer)
 def answer_of(rating: RatingIn, model: type[A]) -> A:
     """The answer, which is one of this kind; AnswerOfOtherKind where it is not."""
     if not isinstance(rating.answer, model):
+        # The kind is a literal type, whose one argument is the name.
         kind = str(get_args(model.model_fields["kind"].annotation)[0])
         raise AnswerOfOtherKind(
             f"Expected an answer of the kind {kind}, as this study declares it; got {rating.answer.kind}."
@@ -84,5 +86,6 @@ _SERVED: dict[str, ServedKind] = {}
 def served_kind(kind: str) -> ServedKind:
     """What the server does for trials of this kind."""
     if kind not in _SERVED:
+        # Decision 0322: kinds are found by their names. Imported at first use, since they import this module.
         _SERVED[kind] = import_module(f"server.participation.kinds.{kind}").SERVED
     return _SERVED[kind]

@@ -36,6 +36,7 @@ const pictureOf = (clip: SingleClip, index: number): ImageBitmap | undefined =>
   "bitmaps" in clip ? clip.bitmaps[index] : clip.picture(index);
 
 export function framesOf(clip: SingleClip | Composed): number {
+  // The longest clip decides; shorter ones hold their last frame.
   return "parts" in clip ? Math.max(...clip.parts.map((part) => countOf(part.clip))) : countOf(clip);
 }
 

@@ -75,6 +75,7 @@ export class RefreshClock {
   /** From the next refresh on; takes the place of the job before. */
   start(job: Job): void {
     this.job = job;
+    // A refresh is asked for already: a second request would count each one twice.
     if (this.going) return;
     this.going = true;
     this.count = 0;
@@ -90,6 +91,7 @@ export class RefreshClock {
       this.going = false;
       return;
     }
+    // Before the job, which may take longer than a refresh.
     this.request((next) => this.tick(next));
     this.putOff(() => this.run(now));
   }
@@ -119,6 +121,7 @@ export class EvennessMeter {
 
   add(refresh_at_ms: number, ran_at_ms: number): void {
     if (this.before_ms !== null) this.gap_ms = Math.max(this.gap_ms, ran_at_ms - this.before_ms);
+    // Browsers may stamp a refresh later than its callback: negative values do not count.
     this.late_ms = Math.max(this.late_ms, ran_at_ms - refresh_at_ms);
     this.before_ms = ran_at_ms;
     this.refreshes_ms.push(refresh_at_ms);

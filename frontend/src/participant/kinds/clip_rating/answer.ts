@@ -32,10 +32,12 @@ export interface ClipRatingData {
 export function ready(session: Session, stage: Stage, { number, total, play, trial }: TrialParameters, view: number): Promise<number> {
   const { t } = session;
   const { views, pointer_delay_ms } = declaredRating(session);
+  // Asked for at each view: a tablet may have a mouse by now.
   const touch = matchMedia("(pointer: coarse)").matches;
   const first = t(touch ? "ready_touch" : "ready");
   const prompt = view > 1 ? t(touch ? "ready_again_touch" : "ready_again", { view, views }) : first;
   const key = trial.kind === "practice" ? "practice_note" : "trial_of";
+  // A repeated clip is announced, or it would seem to be a mistake.
   const note = play > 1 && trial.kind !== "practice" ? t("ready_replay") : t(key, { number, total });
   return waitForStart(session, stage, prompt, note, pointer_delay_ms);
 }
@@ -60,6 +62,7 @@ export function bodyOf(session: Session, { trial, play }: TrialParameters, showi
 function answerOf({ answers, at_ms }: Rated, from_ms: number | undefined): RatingAnswer {
   const timed = Object.entries(answers).map(([name, given]) => {
     const at = at_ms[name];
+    // Without a drawn last frame there is no moment to count from.
     const rt = at === undefined || from_ms === undefined ? null : duration(at - from_ms);
     return [name, { ...given, rt }];
   });

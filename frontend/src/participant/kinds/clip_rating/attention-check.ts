@@ -9,6 +9,7 @@ import { askAttention } from "../../trials/answers";
 
 export async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<{ response: number }> {
   const { check_scale, pointer_delay_ms, confirm } = declaredRating(session);
+  // An instruction to press a number cannot be answered by "does not apply".
   const scales = [{ ...check_scale, not_applicable: null }];
   const { language, t } = session;
   const { answer, rt } = await askAttention(session, display, trial, (below, question, signal) =>
@@ -19,6 +20,7 @@ export async function check(session: Session, display: HTMLElement, trial: Trial
 }
 
 export function store(session: Session, trial: TrialInfo, rated: Rated, rt: number): Promise<void> {
+  // A check has no clip.
   const playback = playbackRecord(null, [], session.screen.record());
   const answer = { kind: "clip_rating", answers: rated.answers } as const;
   return saveRating(session, trial, ratingBody(session, trial, 1, answer, playback, { rt, changes: rated.changes }));

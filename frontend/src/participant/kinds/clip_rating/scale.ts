@@ -38,6 +38,7 @@ const makers = new Map<string, MakeWidget>();
 /** Fetch what draws these scales. The kind asks for it before its first trial, so that no scale waits. */
 export async function loadWidgets(scales: readonly Scale[]): Promise<void> {
   for (const { type } of scales) {
+    // Several scales of one type share what draws them.
     if (makers.has(type)) continue;
     const load = files[`../../trials/scales/${type}.ts`];
     if (!load) throw new Error(`expected a scale this page knows, got ${type}; load the page again`);
@@ -89,6 +90,7 @@ export async function askInOrder(container: HTMLElement, trial: ShownClipRating,
     const rated = await withOwnKeys(shared.signal, (signal) => askScales(container, { ...screen, signal }));
     Object.assign(all.answers, rated.answers);
     Object.assign(all.at_ms, rated.at_ms);
+    // The last screen decides when the trial was answered; only it has the comment.
     Object.assign(all, { answered_at_ms: rated.answered_at_ms, changes: all.changes + rated.changes, comment: rated.comment });
   }
   return all;
@@ -138,6 +140,7 @@ class ScalesView {
     this.meant = new MeantPress(pointer_delay_ms, signal);
     this.blocks = scales.map((scale, number) => this.block(scale, number));
     this.comment = comment ? h("textarea", { rows: 2, maxlength: 2000, id: uniqueId("comment") }) : null;
+    // With one settled scale the press itself ends the trial; anything else needs a button.
     const asks = confirm || comment || scales.length > 1 || this.blocks.some(({ widget }) => !widget.settles);
     this.confirm = asks ? button(t("confirm"), () => this.finish()) : null;
     if (this.confirm) this.confirm.disabled = true;
@@ -164,6 +167,7 @@ class ScalesView {
       ...widget.parts,
       not_applicable,
     );
+    // The width follows from the number of points; other scales take that of eight.
     group.style.setProperty("--points", String(scale.type === "points" ? scale.maximum - scale.minimum + 1 : 8));
     const element = h("div", { class: "scale-block" }, question, group);
     const block: Block = { scale, element, group, widget, not_applicable, chosen: null };
@@ -220,6 +224,7 @@ class ScalesView {
   private finish(): void {
     const open = this.blocks.find(({ chosen }) => !chosen);
     if (open) return this.goTo(open);
+    // A second Enter within the delay below must not answer again.
     if (this.over) return;
     const answers: Answers = {};
     const at_ms: Record<string, number> = {};

@@ -9,6 +9,7 @@ import "../../trials/answers.css";
 
 export async function check(session: Session, display: HTMLElement, trial: TrialInfo): Promise<{ chosen: number }> {
   const { check_scale, pointer_delay_ms } = declaredContinuous(session);
+  // Texts, as pressed keys are.
   const numbers = Array.from({ length: check_scale.maximum }, (_, index) => String(index + 1));
   const { answer, rt } = await askAttention(session, display, trial, (below, question, signal) =>
     askAnswer(below, {
@@ -26,5 +27,6 @@ export async function check(session: Session, display: HTMLElement, trial: Trial
 }
 
 export function store(session: Session, trial: TrialInfo, chosen: number, rt: number): Promise<void> {
+  // A check has one play and no clip.
   return saveRating(session, trial, continuousBody(session, trial, 1, { chosen }, playbackRecord(null, [], session.screen.record()), rt));
 }

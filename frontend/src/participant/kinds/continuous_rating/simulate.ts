@@ -10,7 +10,9 @@ import { stepFrames } from "./track";
 export async function simulatedTrace(session: Session, { trial, play }: TrialParameters): Promise<ContinuousData> {
   const { minimum, maximum, sample_hz } = declaredContinuous(session);
   const step_frames = stepFrames(trial.fps ?? 30, sample_hz);
+  // The first frame has a sample, then every step after it.
   const length = Math.floor(((trial.frames ?? 1) - 1) / step_frames) + 1;
+  // A slider that nobody moves stays in the middle.
   const values = Array.from({ length }, () => (minimum + maximum) / 2);
   const answer = { values, step_frames, moves: 0 };
   await saveRating(

@@ -39,6 +39,7 @@ export function layoutOf(
   const gap_px = presentation.gap_mm * (px_per_mm ?? ASSUMED_PX_PER_MM);
   if (presentation.arrangement === "stacked") return arranged("stacked", pixels, shown, gap_px);
   if (2 * shown.width + gap_px <= room.width) return arranged("side_by_side", pixels, shown, gap_px);
+  // Stacked clips need the height for both, and for the answers below.
   const fits = 2 * shown.height + gap_px + ANSWERS_PX <= room.height;
   return presentation.if_too_narrow === "stack" && fits ? arranged("stacked", pixels, shown, gap_px) : null;
 }
@@ -46,6 +47,7 @@ export function layoutOf(
 function arranged(arrangement: Arrangement, pixels: Size, shown: Size, gap_px: number): Layout {
   // Pixels of the clip per CSS px.
   const scale = pixels.width / shown.width;
+  // Whole pixels of the canvas, or the second clip would be blurred.
   const gap = Math.round(gap_px * scale);
   const across = arrangement === "side_by_side" ? pixels.width + gap : 0;
   const below = arrangement === "stacked" ? pixels.height + gap : 0;

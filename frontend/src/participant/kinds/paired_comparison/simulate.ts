@@ -22,6 +22,7 @@ export async function simulatedComparison(session: Session, { trial, play }: Tri
 /** Presses start, then the second clip, then whatever goes on. */
 export function actComparison(display: HTMLElement): void {
   actWhileShown(display, () => {
+    // The answers appear only after both clips; until then start is what can be pressed.
     const press =
       display.querySelector<HTMLButtonElement>(".pair-answer[data-answer=right]") ?? display.querySelector<HTMLButtonElement>(".primary");
     press?.click();

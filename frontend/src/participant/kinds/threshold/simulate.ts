@@ -18,6 +18,7 @@ export async function simulatedThreshold(session: Session, { trial, play }: Tria
 /** Presses start, then the second answer, then whatever goes on. */
 export function actThreshold(display: HTMLElement): void {
   actWhileShown(display, () => {
+    // The question may be on the page already; else start is what can be pressed.
     const press = [...display.querySelectorAll<HTMLButtonElement>(".pair-answer")].at(-1);
     (press ?? display.querySelector<HTMLButtonElement>(".primary"))?.click();
   });

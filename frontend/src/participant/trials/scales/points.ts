@@ -26,6 +26,7 @@ export function widget({ scale, language, t, meant, choose }: Ask): Widget {
   });
   const dir = scaleDirection();
   const row = h("div", { class: labels.length ? "keys keys-labelled" : "keys", dir }, ...keys);
+  // Hidden from screen readers: the keys at the ends have these words in their names.
   const ends = h("div", { class: "ends", "aria-hidden": "true", dir }, h("span", {}, textOf(0)), h("span", {}, textOf(maximum - minimum)));
   row.style.setProperty("--points", String(keys.length));
 
@@ -33,6 +34,7 @@ export function widget({ scale, language, t, meant, choose }: Ask): Widget {
   function move(step: -1 | 0 | 1): void {
     if (step === 0) return;
     const now = keys.findIndex((key) => key === document.activeElement);
+    // From outside the row the first arrow key goes to the nearer end.
     const next = now < 0 ? (step > 0 ? 0 : keys.length - 1) : Math.min(keys.length - 1, Math.max(0, now + step));
     keys[next]?.focus();
   }
