@@ -117,7 +117,7 @@ def start_run(
 ) -> RunStarted:
     """Begin a run, or give back the one this browser, person or personal link already has."""
     link = find_link(session, token)
-    # Locked first in every request: two orders of locks would wait for each other.
+    # The study first, as in `complete_run`: two orders of locks would wait for each other.
     study = run_repository.lock_study(session, link.study_id)
     # By client id, personal link or the recruiter's id: asking twice gives one run.
     known = returning.known_run(settings, versions, session, link, recruiter_of(link), start)
