@@ -170,6 +170,11 @@ def contents_of_groups(prepared: PlanRows, analyse: Callable[[PlanRows], Content
         # The key becomes a part of file names, in which a slash is a folder.
         parts += [part.under(name.replace("/", "-"), title) for part in contents.parts]
         made.append((name, contents, comparisons_of(mine)))
+    if not made:
+        raise InputError(
+            f"{experiment.name}: no comparison has items of a declared group; check that the data belong to "
+            "this version of the study"
+        )
     agreement, reason = _agreement(experiment, [comparisons for *_, comparisons in made])
     people = prepared.rows["participant"].astype(str).nunique()
     # Methods and labels are the same in every group.
@@ -258,7 +263,7 @@ def _together(every: Sequence[Comparisons]) -> Comparisons:
 def _agreement_part(test: LikelihoodRatio | None, reason: str | None, name: str, synthetic: bool) -> Part:
     if test is None:
         return Part((), (f"Agreement of the groups was not tested: {reason}.",), "Agreement of the groups")
-    verdict = "differ" if test.p < 0.05 else "did not differ significantly"
+    verdict = "differed" if test.p < 0.05 else "did not differ significantly"
     said = f"Abilities {verdict} between the groups, χ²({test.df}) = {fixed(test.chi2)}, {apa_p(test.p)}."
     row = ("Same abilities in all groups", fixed(test.chi2), str(test.df), p_value(test.p))
     header = ("Hypothesis", "χ²", "df", "p")

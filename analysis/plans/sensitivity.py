@@ -4,7 +4,7 @@ models."""
 import re
 from collections.abc import Callable
 from functools import partial
-from math import isfinite
+from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
 from analysis.plans.result import Analysis, Labels
@@ -338,8 +338,9 @@ def bayes_factors(analysis: Analysis) -> Section:
     for pair in (p for p in analysis.pairs if p.effect in names):
         bf = pair.bayes_factor
         name = analysis.labels.pair(pair.cell_a, pair.cell_b)
-        # A factor of 0 has no reciprocal.
-        rows.append((name, fixed(pair.t), _factor(bf), _factor(1 / bf if bf else bf), _in_words(bf)))
+        # A factor that underflows to 0 has an infinite reciprocal.
+        reverse = 1 / bf if bf else inf
+        rows.append((name, fixed(pair.t), _factor(bf), _factor(reverse), _in_words(bf)))
     header = ("Margin: pair", "t", "BF₁₀", "BF₀₁", "Evidence")
     table = Table(
         "bayes", caption("Bayes factors of pairs", analysis.name, analysis.synthetic), header, tuple(rows), 1

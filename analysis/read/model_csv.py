@@ -111,7 +111,7 @@ def _refuse_shared_roles(participant: str, rating: str, within: Sequence[str], i
     names = [participant, rating, *within]
     for name in names:
         # The rating cannot also be an item; a factor can, where each level is one clip.
-        if names.count(name) > 1 or (name in item and name != participant and name == rating):
+        if names.count(name) > 1 or (name in item and name == rating):
             raise InputError(f"column '{name}' is named for two roles; each role needs a separate column")
 
 

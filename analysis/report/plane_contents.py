@@ -192,7 +192,9 @@ def draw(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], synthetic: b
                 axes.plot(across, [point.threshold for point in line], color="black", linewidth=1.3)
                 ends = [(point.ci.low, point.ci.high) for point in line]
                 known = [
-                    (at, low, high) for at, (low, high) in zip(across, ends, strict=True) if low and high
+                    (at, low, high)
+                    for at, (low, high) in zip(across, ends, strict=True)
+                    if low is not None and high is not None
                 ]
                 # A band needs two places.
                 if len(known) > 1:
