@@ -168,12 +168,13 @@ def _by_correlation(scores: Array, limit: float, conditions: Codes | None) -> di
         by_condition = np.full(len(scores), -np.inf)
         if conditions is not None:
             by_condition[kept] = mean_correlations(_condition_means(scores[kept], conditions))
-            r[by_condition >= P913_CONDITIONS_BELOW] = np.inf
+            # Infinite where somebody rated too few conditions: then the clips alone decide.
+            r[np.isfinite(by_condition) & (by_condition >= P913_CONDITIONS_BELOW)] = np.inf
         lowest = int(np.argmin(r))
         if not r[lowest] < limit:
             break
         reasons[lowest] = f"correlation {r[lowest]:.2f} with the mean ratings, below {limit:g}"
-        if conditions is not None:
+        if np.isfinite(by_condition[lowest]):
             reasons[lowest] += (
                 f", and {by_condition[lowest]:.2f} by condition, below {P913_CONDITIONS_BELOW:g}"
             )

@@ -375,9 +375,10 @@ def fit_abilities(
     model = Model(method, design, order_effect)
     fitted = fit(model, counts, firth=firth)
     effects: tuple[RandomEffect, ...] = ()
+    said: tuple[str, ...] = ()
     if crossed:
         data = crossed_pairs(comparisons, model, items_vary=factors is not None)
-        fitted, effects = fit_crossed(data, fitted)
+        fitted, effects, said = fit_crossed(data, fitted)
     # Rows of all parameters, with zeros for what is not an ability (order, ties).
     full = np.zeros((len(comparisons.items), model.names))
     full[:, : design.shape[1]] = design
@@ -419,7 +420,7 @@ def fit_abilities(
         () if factors is None or crossed else factor_tests(comparisons.items, factors, model, counts),
         transitivity(comparisons),
         firth,
-        (*comparisons.decisions, *notes),
+        (*comparisons.decisions, *said, *notes),
         tie if method == "rao-kupper" else None,
         intervals,
         effects,

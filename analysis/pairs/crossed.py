@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, sparse, stats
+from scipy import optimize, sparse, special, stats
 
 from analysis.models.laplace import Trials
 from analysis.pairs.comparisons import LEFT, RIGHT, TIE, Comparisons
@@ -16,7 +16,14 @@ Codes = NDArray[np.int64]
 OTHERS_MAX = 4000
 """Effects of contents and items whose matrix is inverted whole."""
 SD_MAX = 10.0
-"""Log odds beyond which raters never contradict themselves: the likelihood has no maximum."""
+"""Log odds beyond which answers never contradict one another."""
+OVERESTIMATE_MAX = 1.0
+"""Of the log-likelihood by Laplace's approximation: where an SD runs away it is too high by 10 and more."""
+BIAS_NOTED = 1.0
+"""Underestimates of the log-likelihood that are said: the SD is then a little too small."""
+DRAWS, CELLS_MAX = 1000, 20_000_000
+WIDER = 1.3
+"""Of the draws' spread, so that they also reach where the likelihood is skewed."""
 GRADIENT_MAX = 0.1
 """Of a log-likelihood at its maximum. The search stops at less, or where rounding hides a further rise."""
 
@@ -243,13 +250,13 @@ def crossed_pairs(comparisons: Comparisons, model: Model, *, items_vary: bool) -
     )
 
 
-def fit_crossed(data: CrossedPairs, start: Fit) -> tuple[Fit, tuple[RandomEffect, ...]]:
-    """Maximize the Laplace likelihood; `start` is the fit without random effects.
+def fit_crossed(data: CrossedPairs, start: Fit) -> tuple[Fit, tuple[RandomEffect, ...], tuple[str, ...]]:
+    """Maximize the Laplace likelihood from the fit without random effects; last, notes on its accuracy.
 
     Raises
     ------
     InputError
-        Where it has no maximum inside the parameters' limits.
+        The search does not converge, or its maximum is one of the approximation alone.
     """
     number = len(data.names)
     # Not from zero: the likelihood is even in an SD, so that the search would never leave it.
@@ -263,14 +270,65 @@ def fit_crossed(data: CrossedPairs, start: Fit) -> tuple[Fit, tuple[RandomEffect
         p = float(stats.chi2.sf(chi2, 1)) / 2 if chi2 > 0 else 1.0
         # The likelihood is even in an SD: a negative one is the same model.
         sd = abs(float(theta[len(start.parameters) + index]))
-        if sd > SD_MAX:
-            raise InputError(
-                f"the SD of '{name}' grows without limit (above {SD_MAX:g} log odds): answers of each hardly "
-                "ever contradict one another. Remove --crossed, or collect more comparisons"
-            )
         effects.append(RandomEffect(name, data.levels[index], sd, chi2, p))
+    error = laplace_error(data, theta)
+    if error < -OVERESTIMATE_MAX:
+        raise InputError(
+            f"too few answers of each rater for --crossed: its log-likelihood is too high by {-error:.1f}. "
+            "Remove --crossed, or collect more comparisons of each pair by each rater"
+        )
+    runaway = next((one for one in effects if one.sd > SD_MAX), None)
+    if runaway is not None:
+        raise InputError(
+            f"the SD of '{runaway.name}' grows without limit (above {SD_MAX:g} log odds): answers of each "
+            "hardly ever contradict one another. Remove --crossed, or collect more comparisons"
+        )
+    notes = (
+        (f"crossed effects: the log-likelihood is {error:.1f} too low, so SDs may be a little too small",)
+        if error > BIAS_NOTED
+        else ()
+    )
     covariance = _covariance(data, theta)[: len(start.parameters), : len(start.parameters)]
-    return Fit(theta[: len(start.parameters)], covariance, value, start.shares), tuple(effects)
+    return Fit(theta[: len(start.parameters)], covariance, value, start.shares), tuple(effects), notes
+
+
+def laplace_error(data: CrossedPairs, theta: Array) -> float:
+    r"""How far the Laplace log-likelihood of the raters' effects is from that by importance sampling.
+
+    .. math::
+
+        \log \int e^{\ell_g(u) - u'u/2} du \approx
+        \log \frac{1}{S} \sum_s \frac{e^{\ell_g(u_s) - u_s'u_s/2}}{q(u_s)}, \quad
+        u_s \sim q = N(\hat u_g, c^2 H_g^{-1}) \tag{2}
+
+    Effects of contents and items stay at their mode.
+    """
+    f, edges = data.x.shape[1], data.edges.shape[1]
+    thresholds, sd = data.edges @ theta[f : f + edges], theta[f + edges :]
+    likelihood = CrossedLikelihood(data)
+    _, blocks = likelihood._modes(thresholds, data.x @ theta[:f], sd)
+    mode, (raters, items) = likelihood.u, data.shape
+    fixed = data.x @ theta[:f] + data.others @ (sd[data.of_column] * likelihood.v)
+    spread = WIDER * np.linalg.cholesky(blocks.inverse)
+    ends = np.concatenate([[-np.inf], thresholds, [np.inf]])
+    upper, lower = ends[data.category + 1], ends[data.category]
+
+    def joint(u: Array) -> Array:
+        """Log of likelihood and density of the effects u (G, k), by rater."""
+        eta = fixed + sd[0] * (likelihood.own @ u.ravel())
+        chance = special.expit(upper - eta) - special.expit(lower - eta)
+        by_rater = np.bincount(data.rater, np.log(np.maximum(chance, 1e-300)), raters)
+        return np.asarray(by_rater - (u**2).sum(axis=1) / 2)
+
+    # Fewer draws for larger tables, whose raters have more answers each.
+    count = max(50, min(DRAWS, CELLS_MAX // len(data.x)))
+    random = np.random.default_rng(1)
+    drawn = np.empty((count, raters))
+    for row in drawn:
+        e = random.standard_normal((raters, items))
+        row[:] = joint(mode + np.einsum("gij,gj->gi", spread, e)) + (e**2).sum(axis=1) / 2
+    reached = special.logsumexp(drawn, axis=0) - np.log(count) + items * np.log(WIDER)
+    return float((reached - joint(mode)).sum())
 
 
 def _maximum(data: CrossedPairs, theta: Array, fixed: tuple[int, ...]) -> tuple[Array, float]:

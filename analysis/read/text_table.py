@@ -120,7 +120,7 @@ class TextTable:
         """Whether a column `synthetic`, where it was read, marks a row as made and not given by a person."""
         # pandas and R write a column of 0 and 1 that has passed through a condition as words.
         marks = self.columns.get("synthetic")
-        return marks is not None and bool(marks.astype(str).str.lower().isin(("1", "true")).any())
+        return marks is not None and bool(marks.astype(str).str.lower().isin(("1", "1.0", "true")).any())
 
     def line(self, row: int) -> str:
         """Line of the file on which data row `row` (from 0) begins: `7`, in a folder `7 of p1.csv`."""

@@ -162,7 +162,7 @@ class ExcludeEvidence(LeavesOutRuns):
     def reason(self) -> str:
         """The reason in words, for a Methods section."""
         verdicts = " or ".join(verdict.replace("_", " ") for verdict in self.verdicts)
-        return f"evidence of a person that was {verdicts}"
+        return f"a verdict of {verdicts} on whether a person answered"
 
     def excludes(self, run: RunTrials) -> str | None:
         """The verdict."""
@@ -228,7 +228,7 @@ class ExcludePlayback(LeavesOutRuns):
 
     def reason(self) -> str:
         """The reason in words, for a Methods section."""
-        return f"more than {self.more_than:.0%} of clips not shown as declared"
+        return f"more than {100 * self.more_than:g}% of clips not shown as declared"
 
     def excludes(self, run: RunTrials) -> str | None:
         """The share of poor presentations."""
@@ -251,7 +251,7 @@ class ExcludeStraightLining(LeavesOutRuns):
 
     def reason(self) -> str:
         """The reason in words, for a Methods section."""
-        return f"the same answer in more than {self.more_than:.0%} of trials"
+        return f"the same answer in more than {100 * self.more_than:g}% of trials"
 
     def excludes(self, run: RunTrials) -> str | None:
         """The share of the most frequent answer."""

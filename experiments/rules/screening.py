@@ -30,6 +30,8 @@ class AttentionChecks(Declaration):
 
 
 FAILED_CHECK = "a failed attention check"
+NO_BRACES = str.maketrans("{}", "()")
+"""Sentences of a Methods section have their numbers in braces."""
 
 
 class ScreenAttention(Declaration):
@@ -90,7 +92,7 @@ class ScreenFormAnswer(Declaration):
         """The reason in words, for a Methods section."""
         low = [] if self.below is None else [f"below {self.below}"]
         high = [] if self.above is None else [f"above {self.above}"]
-        answers = " or ".join([*self.refused, *low, *high])
+        answers = " or ".join([*self.refused, *low, *high]).translate(NO_BRACES)
         return f"the answer {answers} to '{self.field}' of the form '{self.form}'"
 
     def screens_out(self, answer: object) -> bool:

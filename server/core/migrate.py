@@ -129,8 +129,10 @@ def _known_revisions() -> tuple[frozenset[str], str]:
         {revision for text in texts for revision in re.findall(rf'^{name} = "(\w+)"', text, re.MULTILINE)}
         for name in ("revision", "down_revision")
     )
-    (newest,) = known - built_on
-    return frozenset(known), newest
+    heads = sorted(known - built_on)
+    if len(heads) != 1:
+        raise RuntimeError(f"expected one newest migration, found {', '.join(heads) or 'none'}")
+    return frozenset(known), heads[0]
 
 
 def newest_revision() -> str:

@@ -108,6 +108,9 @@ def backup(
     path = file or Path(name)
     if path.exists() and not replace:
         raise InputError(f"{path} already exists; choose another file, or add --replace to overwrite it")
+    if not path.parent.exists():
+        # A disk that is not mounted leaves a folder that does not exist, either.
+        sys.stderr.write(f"note: creates the folder {path.parent.absolute()}, which did not exist\n")
     with stored_services() as services:
         described = backups.back_up(
             services.database,

@@ -76,8 +76,11 @@ def _runs_elsewhere(session: Session, study: Study, origin: str, series: int) ->
 
 def paragraph_of(known: MethodsFigures, results: dict[str, Any] | None) -> Methods:
     """The paragraph of what was counted, and of the results of a report."""
-    reasons: dict[str, str] = {rule.rule: rule.reason() for rule in known.described.experiment.exclusions}
-    excluded = _exclusion_counts(results, reasons)
+    reasons: dict[str, list[str]] = {}
+    for rule in known.described.experiment.exclusions:
+        reasons.setdefault(rule.rule, []).append(rule.reason())
+    # The report counts by the name of a rule, which may be declared with several limits.
+    excluded = _exclusion_counts(results, {name: " or ".join(said) for name, said in reasons.items()})
     described = replace(
         known.described,
         rules=[(name, words) for name, (words, _) in excluded.items()],
@@ -122,16 +125,19 @@ def _exclusion_counts(
     left_out = (results or {}).get("exclusions") or {}
     counts: dict[str, int] = {}
     for run in left_out.get("runs", []):
-        for reason in run["reasons"]:
-            rule = str(reason).split(":", 1)[0]
+        for rule in {str(reason).split(":", 1)[0] for reason in run["reasons"]}:
             counts[rule] = counts.get(rule, 0) + 1
     excluded = {
         f"visits_{_key(rule)}": (said("visit", rule), count, "exclusions.runs[].reasons")
         for rule, count in counts.items()
     }
+    trials: dict[str, int] = {}
     for dropped in left_out.get("trials", []):
-        words = said("trial", dropped["rule"])
-        excluded[f"trials_{_key(dropped['rule'])}"] = (words, int(dropped["trials"]), "exclusions.trials[]")
+        trials[dropped["rule"]] = trials.get(dropped["rule"], 0) + int(dropped["trials"])
+    excluded |= {
+        f"trials_{_key(rule)}": (said("trial", rule), count, "exclusions.trials[]")
+        for rule, count in trials.items()
+    }
     return {
         name: (words, Number(name, count, f"{RESULTS} of the report: {source} of this rule"))
         for name, (words, count, source) in excluded.items()

@@ -284,6 +284,9 @@ def _onsets(path: Path, duration_s: float) -> list[float]:
 GAZE_DEG_MAX = 60.0
 SHIFT_DEG_PER_S = 80.0
 """Eyes that turn faster make a saccade; pursuit of what moves is slower."""
+SHIFT_DEG_MIN = 3.0
+"""Smaller saccades bring no blink (Evinger and others 1994), and are hard to tell from noise."""
+GAZE_HZ = 200
 
 
 class GazeTrack(NamedTuple):
@@ -328,15 +331,19 @@ def read_gaze(path: Path, duration_s: float) -> GazeTrack:
 
 def gaze_shifts(gaze: GazeTrack) -> list[Event]:
     """The saccades of a track: where they begin, and how far each leads."""
-    steps = np.hypot(*np.diff(gaze.deg, axis=0).T)
-    # False at both ends, so that every saccade begins and ends.
-    fast = np.r_[False, steps / np.diff(gaze.time_s) > SHIFT_DEG_PER_S, False]
+    at = np.arange(gaze.time_s[0], gaze.time_s[-1] + 1 / GAZE_HZ, 1 / GAZE_HZ)
+    # Averaged over 20 ms: from sample to sample the noise of an eye tracker is as fast as a saccade.
+    window = np.full(GAZE_HZ // 50, 50 / GAZE_HZ)
+    raw = [np.interp(at, gaze.time_s, column) for column in gaze.deg.T]
+    padded = [np.pad(one, (window.size // 2, window.size - 1 - window.size // 2), mode="edge") for one in raw]
+    deg = np.stack([np.convolve(one, window, mode="valid") for one in padded], axis=1)
+    fast = np.r_[False, np.hypot(*np.diff(deg, axis=0).T) * GAZE_HZ > SHIFT_DEG_PER_S, False]
     begins, ends = (np.flatnonzero(fast[1:] & ~fast[:-1]), np.flatnonzero(~fast[1:] & fast[:-1]))
+    ways = np.hypot(*(deg[ends] - deg[begins]).T)
     return [
-        Event("gaze_shift", float(gaze.time_s[begin]), float(np.hypot(*(gaze.deg[end] - gaze.deg[begin]))))
-        for begin, end in zip(begins, ends, strict=True)
-        # Times before 0 only lead in to the direction at the start.
-        if gaze.time_s[begin] >= 0
+        Event("gaze_shift", float(at[begin]), float(way))
+        for begin, way in zip(begins, ways, strict=True)
+        if at[begin] >= 0 and way >= SHIFT_DEG_MIN
     ]
 
 

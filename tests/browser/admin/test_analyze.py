@@ -65,6 +65,7 @@ def test_a_refusal_names_the_roles_of_the_page(dashboard: Dashboard, tmp_path: P
     alert = page.get_by_role("alert")
     expect(alert).to_contain_text("use “Factor between participants”")
     expect(alert).not_to_contain_text("--")
+    expect(alert).not_to_contain_text("Something went wrong")
     dashboard.complaints.clear()  # Chromium reports the refusal as a failed request
 
 

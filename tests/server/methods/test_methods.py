@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from sqlalchemy import text
 
+from experiments.rules.screening import ScreenFormAnswer
 from server.accounts.identity import OPERATOR
 from server.context import Services
 from server.privacy.erasures import erase
@@ -115,6 +116,29 @@ def test_a_report_adds_what_each_declared_rule_left_out(
     said = "excluded two visits for a failed attention check; nine trials for slow trials."
     assert said in found.plain()
     assert json.loads(found.json())["paragraph"] == found.plain()
+
+
+def test_rules_of_one_name_are_counted_once_and_both_limits_are_named(
+    client: TestClient, study: StudyInDatabase, owner: Admin, services: Services
+) -> None:
+    late = '[[exclusions]]\nrule = "slow_trials"\nabove_ms = '
+    twice = f"{late}9000\n{late}4000\n"
+    save_version(owner, SHORT + "\n" + twice)
+    complete(client, study.link_token)
+    both = ["attention_checks_failed: 3 failed", "attention_checks_failed: 3 failed"]
+    trials = [{"rule": "slow_trials", "trials": n, "participants": 1} for n in (9, 2)]
+    results = {"exclusions": {"runs": [{"participant": "p", "run": "r", "reasons": both}], "trials": trials}}
+    with services.database.read() as session:
+        study_row = find_study(session, "short", OPERATOR, "view")
+        said = methods_of(session, study_row, "participant", None, results).plain()
+    assert "one visit for a failed attention check" in said
+    both_late = "an answer more than 9 s after the clip or an answer more than 4 s after the clip"
+    assert f"11 trials for {both_late}." in said
+
+
+def test_an_answer_with_braces_is_no_number_of_the_text() -> None:
+    rule = ScreenFormAnswer(form="who", field="sport", refused=("{other}", "{begun}"))
+    assert rule.reason() == "the answer (other) or (begun) to 'sport' of the form 'who'"
 
 
 def test_nobody_has_taken_part_yet(viewer: Admin, study: StudyInDatabase) -> None:

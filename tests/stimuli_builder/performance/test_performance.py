@@ -15,7 +15,9 @@ from stimuli_builder.blinks.export import AnimationCurve, CurveTarget, write_cur
 from stimuli_builder.cli import app
 from stimuli_builder.clips.design_clips import performance_curve
 from stimuli_builder.performance.run import (
+    GazeTrack,
     PerformanceJob,
+    gaze_shifts,
     speech_in_audio,
     speech_in_subtitles,
     write_performance,
@@ -288,6 +290,18 @@ def test_lids_follow_a_gaze_whose_large_shifts_bring_blinks(tmp_path: Path) -> N
     assert shapes["EyeLookOutRight"][150] == shapes["EyeLookInLeft"][150] == 1
     assert shapes["EyeLookInRight"][150] == shapes["EyeLookUpLeft"][150] == 0
     assert shapes["EyeLookDownRight"][-1] == pytest.approx(30 / 35, abs=1e-4)
+
+
+@pytest.mark.parametrize(("noise_deg", "rate_hz"), [(0.1, 500), (0.3, 250), (0.3, 500)])
+def test_noise_of_an_eye_tracker_is_no_gaze_shift(noise_deg: float, rate_hz: int) -> None:
+    random = np.random.default_rng(1)
+    times = np.arange(0, 60, 1 / rate_hz)
+    resting = noise_deg * random.normal(size=(times.size, 2))
+    assert gaze_shifts(GazeTrack(times, resting)) == []
+    shifted = resting + np.outer(np.clip((times - 30) / 0.06, 0, 1), [20.0, 0.0])
+    [shift] = gaze_shifts(GazeTrack(times, shifted))
+    assert shift.time_s == pytest.approx(30, abs=0.03)
+    assert shift.amplitude_deg == pytest.approx(20, abs=1.5)
 
 
 @pytest.mark.parametrize(

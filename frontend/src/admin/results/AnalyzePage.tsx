@@ -2,7 +2,7 @@
 import { Alert, Anchor, Button, Card, Code, CopyButton, FileInput, Group, NativeSelect, Stack, Table, Text, Title } from "@mantine/core";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
-import { api, type Schemas, unwrap } from "../api";
+import { Refused, api, type Schemas, unwrap } from "../api";
 import { ErrorAlert } from "../ui/Answer";
 import { DropZone } from "../ui/DropZone";
 import { counted } from "../ui/format";
@@ -60,7 +60,8 @@ async function readFile(file: File): Promise<Chosen> {
 /** A refusal speaks of the command's options, which this page shows as roles. */
 function withRoleNames(error: Error): Error {
   const said = error.message.replaceAll(/--([a-z]+)\b/gu, (option, role: string) => (role in ROLES ? `“${ROLES[role]}”` : option));
-  return new Error(said.includes("--") ? `${said}. Options with -- belong to the command analysis` : said);
+  const whole = said.includes("--") ? `${said}. Options with -- belong to the command analysis` : said;
+  return error instanceof Refused ? new Refused(error.status, error.code, whole) : new Error(whole);
 }
 
 export function AnalyzePage() {
