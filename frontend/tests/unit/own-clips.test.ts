@@ -5,12 +5,14 @@ import {
   arrangementOf,
   factorsOf,
   filledByPattern,
+  meetingOfClips,
   type Place,
   placesToSave,
   slotsOf,
   withMoved,
   withRenames,
 } from "../../src/admin/builder/places";
+import { begun, edited } from "../../src/admin/builder/history";
 import { clipFindings, factsOf, pictureProblems, repeatedFiles } from "../../src/admin/clips/examine";
 import { sizeRemark } from "../../src/admin/clips/UploadClips";
 import { languageFindings, summaryOf } from "../../src/admin/studies/Preflight";
@@ -232,11 +234,124 @@ describe("clips in the cells of a study", () => {
       "{robot}_{speed}_{exemplar}.mp4",
     );
     expect(factorsOf(filled.data)).toEqual([
-      { name: "robot", levels: ["rosie"] },
       { name: "speed", levels: ["slow", "fast"] },
+      { name: "robot", levels: ["rosie"] },
     ]);
     expect(files(filled.places, filled.data)).toEqual(["rosie_slow_1.mp4", "rosie_slow_2.mp4", "rosie_fast_1.mp4", "rosie_fast_2.mp4"]);
     expect(arrangementOf(filled.places, filled.data).rest.map(({ file }) => file)).toEqual(["odd.mp4"]);
+  });
+});
+
+describe("clips filled from names", () => {
+  const level = (name: string) => ({ name, label: name });
+  const data = {
+    factors: [
+      { name: "robot", levels: [level("rosie")] },
+      { name: "speed", levels: [level("slow"), level("fast")] },
+    ],
+    exemplars: { per_cell: 1 },
+  };
+  const clip = (file: string, speed = "slow", exemplar = 0): Place => {
+    return { clip_sha256: file, file, levels: { robot: "rosie", speed }, exemplar, upload: null };
+  };
+  const filled = (names: readonly string[], others: readonly Place[] = []) =>
+    filledByPattern([...others, ...names.map((name) => clip(name))], data, "{speed}_{robot}_{exemplar}.mp4");
+  const cellsOf = ({ data: own, places }: ReturnType<typeof filled>) =>
+    arrangementOf(places, own).filled.flatMap((one) => (one.clip === null ? [] : [[one.slot.name, one.clip.file]]));
+
+  it("leave the declared order of factors, and have the numbers of their names", () => {
+    const next = filled(["slow_rosie_2.mp4", "fast_rosie_1.mp4", "fast_rosie_2.mp4"]);
+    expect(factorsOf(next.data).map(({ name }) => name)).toEqual(["robot", "speed"]);
+    expect(cellsOf(next)).toEqual([
+      ["rosie/slow, no. 2", "slow_rosie_2.mp4"],
+      ["rosie/fast, no. 1", "fast_rosie_1.mp4"],
+      ["rosie/fast, no. 2", "fast_rosie_2.mp4"],
+    ]);
+    expect(cellsOf(filled(["slow_rosie_0.mp4", "slow_rosie_7.mp4"])).map(([name]) => name)).toEqual([
+      "rosie/slow, no. 1",
+      "rosie/slow, no. 2",
+    ]);
+  });
+
+  it("come before one that does not fit and was in the place", () => {
+    const next = filled(["slow_rosie_1.mp4"], [clip("a stray.mp4", "slow", 1), clip("another.mp4", "fast", 1)]);
+    expect(cellsOf(next)).toEqual([
+      ["rosie/slow, no. 1", "slow_rosie_1.mp4"],
+      ["rosie/fast, no. 1", "another.mp4"],
+    ]);
+  });
+
+  it("may be as many in a cell as the server takes", () => {
+    expect(slotsOf({ ...data, exemplars: { per_cell: 300 } })).toHaveLength(600);
+    expect(slotsOf({ ...data, exemplars: { per_cell: 5000 } })).toHaveLength(2000);
+  });
+
+  it("keep their level while its name passes through that of another", () => {
+    const stored = [clip("a.mp4", "slow", 1), clip("b.mp4", "fast", 1)];
+    const typed = (words: readonly string[], pause: number) =>
+      words.reduce(
+        (history, word, index) => edited(history, ["factors", 1, "levels", 0, "name"], word, index * pause, data, stored),
+        begun(data, "", null),
+      ).now;
+    for (const pause of [10, 10_000]) {
+      const now = typed(["slo", "f", "fas", "fast", "fast-", "fast-ish"], pause);
+      expect(arrangementOf(now.places ?? stored, now.data).filled.map((one) => one.clip?.file)).toEqual(["a.mp4", "b.mp4"]);
+    }
+  });
+});
+
+describe("clips that two people moved", () => {
+  const level = (name: string) => ({ name, label: name });
+  const named = (...names: string[]) => ({ factors: [{ name: "speed", levels: names.map(level) }], exemplars: { per_cell: 1 } });
+  const base = named("s1", "s2", "s3", "s4");
+  const stored = (cells: Record<string, string>): Place[] =>
+    Object.entries(cells).map(([file, speed]): Place => {
+      const at = { levels: { speed }, exemplar: speed === "" ? 0 : 1 };
+      return { clip_sha256: file, file, ...at, upload: null, from: at };
+    });
+  const before = stored({ a: "s1", b: "s2", c: "s3", d: "s4" });
+  const moved = (from: readonly Place[], cells: Record<string, string>) =>
+    from.map((one) => ({ ...one, levels: { speed: cells[one.file] ?? "" }, exemplar: 1 }));
+  const cellsOf = (places: readonly Place[]) =>
+    Object.fromEntries(places.map(({ file, levels, exemplar }) => [file, exemplar === 0 ? "" : levels["speed"]]));
+  const same = { base, mine: base, theirs: base };
+
+  it("keep moves that only one of them made", () => {
+    const mine = moved(before, { a: "s2", b: "s1", c: "s3", d: "s4" });
+    const met = meetingOfClips(mine, stored({ a: "s1", b: "s2", c: "s4", d: "s3" }), same);
+    expect(cellsOf(met.places)).toEqual({ a: "s2", b: "s1", c: "s4", d: "s3" });
+    expect([met.both, [...met.theirs].sort()]).toEqual([[], ["c", "d"]]);
+    // What both moved alike, and a version in which no clip moved.
+    expect(meetingOfClips(mine, stored({ a: "s2", b: "s1", c: "s3", d: "s4" }), same).both).toEqual([]);
+    expect(cellsOf(meetingOfClips(mine, before, same).places)).toEqual(cellsOf(mine));
+  });
+
+  it("are named where both moved one, and are where the version has them until I choose mine", () => {
+    const mine = moved(before, { a: "s2", b: "s1", c: "s3", d: "s4" });
+    const met = meetingOfClips(mine, stored({ a: "s3", b: "s2", c: "s1", d: "s4" }), same);
+    expect(met.both).toContain("a");
+    expect(cellsOf(met.places)).toEqual({ a: "s3", b: "s2", c: "s1", d: "s4" });
+    expect(cellsOf(met.mine)).toEqual({ a: "s2", b: "s1", c: "s3", d: "s4" });
+    // The next meeting begins from where the version has them.
+    expect(met.mine.find(({ file }) => file === "a")?.from?.levels).toEqual({ speed: "s3" });
+  });
+
+  it("follow levels that either renamed, and lose clips that are no longer in the study", () => {
+    const mine = moved(before, { a: "s2", b: "s1", c: "s3", d: "s4" });
+    const theirs = named("s1", "s2", "third", "s4");
+    const met = meetingOfClips(mine, stored({ a: "s1", b: "s2", c: "third", d: "s4" }), { base, mine: base, theirs });
+    expect([cellsOf(met.places), met.both]).toEqual([{ a: "s2", b: "s1", c: "third", d: "s4" }, []]);
+    const without = meetingOfClips(mine, stored({ a: "s1", b: "s2", c: "s3", e: "s4" }), same);
+    expect(cellsOf(without.places)).toEqual({ a: "s2", b: "s1", c: "s3", e: "s4" });
+  });
+
+  it("are named where two are after one place", () => {
+    const [upload] = moved(stored({ u: "" }), { u: "s4" });
+    const mine = [...before.map((one) => (one.file === "d" ? { ...one, exemplar: 0 } : one)), { ...upload, upload: "up" } as Place];
+    const met = meetingOfClips(mine, stored({ a: "s1", b: "s2", c: "s4", d: "s3" }), same);
+    expect(met.both).toEqual(expect.arrayContaining(["u", "c", "d"]));
+    expect(cellsOf(met.places)).toMatchObject({ c: "s4", d: "s3", u: "" });
+    expect(cellsOf(met.mine)).toMatchObject({ c: "s3", d: "", u: "s4" });
   });
 });
 

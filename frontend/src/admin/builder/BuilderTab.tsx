@@ -1,15 +1,16 @@
 /** The builder: the declaration by forms, its TOML beneath, saved as a new version. */
 import { Button, Group, Stack } from "@mantine/core";
-import { useQuery } from "@tanstack/react-query";
+import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { useState } from "react";
-import { api, type Schemas, unwrap, studyQuery } from "../api";
+import { api, clipsQuery, type Schemas, unwrap, studyQuery } from "../api";
 import { Answer, onDemand } from "../ui/Answer";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { when } from "../ui/format";
 import { isTable } from "./data";
 import { isSame, type Meeting, meetingOf } from "./history";
-import { type Draft, forgetDraft, forgetWork, type Kept, keptWork, otherWork } from "./kept";
+import { type Draft, forgetDraft, forgetWork, type Kept, keptWork, otherWork, tabOf } from "./kept";
+import { meetingOfClips, type Place, storedPlaces } from "./places";
 
 const Workbench = onDemand(async () => (await import("./Workbench")).Workbench);
 const OfferedDrafts = onDemand(async () => (await import("./Drafts")).OfferedDrafts, null);
@@ -37,7 +38,7 @@ async function edit({ places, ...body }: Schemas["EditDefinition"] & Pick<Kept, 
 }
 
 /** Kept work put into a version that somebody else saved meanwhile. Text that is not valid TOML stays as it is. */
-async function broughtTogether({ toml, data, base, places }: Kept, present: string): Promise<Start> {
+async function broughtTogether({ toml, data, base, places }: Kept, present: string, stored: readonly Place[]): Promise<Start> {
   const [mine, before, theirs] = await Promise.all([
     read({ toml, data }),
     read({ toml: base ?? "", data: null }),
@@ -48,9 +49,11 @@ async function broughtTogether({ toml, data, base, places }: Kept, present: stri
   const [old, my, their] = [before, mine, theirs].map(({ comments }) => comments);
   const intoMine = isSame(old, their);
   const lost = intoMine || isSame(old, my) ? [] : (my ?? []).filter((comment) => !old?.includes(comment) && !their?.includes(comment));
-  const meeting = { ...meetingOf(before.data, mine.data, theirs.data), lostComments: lost };
+  const declarations = { base: isTable(before.data) ? before.data : {}, mine: mine.data, theirs: theirs.data };
+  const clips = places === null ? undefined : meetingOfClips(places, stored, declarations);
+  const meeting = { ...meetingOf(before.data, mine.data, theirs.data), lostComments: lost, ...(clips && { clips }) };
   const merged = await read({ toml: intoMine ? mine.toml : present, data: meeting.merged });
-  return { toml: merged.toml, data: merged.data, places, meeting };
+  return { toml: merged.toml, data: merged.data, places: clips?.places ?? null, meeting };
 }
 
 /** Whether kept work differs from what is stored. */
@@ -72,10 +75,15 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
     from.places === kept.places &&
     kept.base !== null &&
     kept.revision !== revision &&
-    kept.base !== detail.toml;
+    (kept.base !== detail.toml || kept.places !== null);
+  const queries = useQueryClient();
+  const meet = async (work: Kept) => {
+    const clips = work.places === null ? [] : await queries.query({ ...clipsQuery(name), staleTime: 0 });
+    return broughtTogether(work, detail.toml, storedPlaces(clips));
+  };
   const start = useQuery({
     queryKey: ["builder start", from, isMet, revision],
-    queryFn: () => (isMet ? broughtTogether(kept, detail.toml) : edit(from)),
+    queryFn: () => (isMet ? meet(kept) : edit(from)),
     staleTime: Infinity,
   });
   const without = (draft: Draft) => setOthers((before) => before.filter((one) => one.key !== draft.key));
@@ -87,8 +95,12 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
     setFrom({ toml: draft.toml, data: draft.data, places: draft.places });
     return true;
   };
-  const discard = (draft: Draft) => {
+  // Also where the server has it, which would offer it again.
+  const discard = async (draft: Draft) => {
     forgetDraft(draft.key);
+    if (mayEdit)
+      await unwrap(api.DELETE("/api/admin/studies/{study}/drafts/{tab}", { params: { path: { study: name, tab: tabOf(draft) } } }));
+    await queries.invalidateQueries({ queryKey: ["drafts", name] });
     without(draft);
   };
   const startOver = () => {
@@ -128,7 +140,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
                 label="Discard it there"
                 question={`The unsaved work from ${when(draft.at)} is deleted permanently.`}
                 confirm="Discard the work"
-                onConfirm={() => discard(draft)}
+                onConfirm={() => void discard(draft)}
               />
               <Difference detail={detail} draft={draft} />
             </Group>

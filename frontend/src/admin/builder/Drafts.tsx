@@ -9,7 +9,7 @@ import { ConfirmButton } from "../ui/ConfirmButton";
 import { counted, plain, when } from "../ui/format";
 import { isTable } from "./data";
 import { changesBetween, placeName } from "./history";
-import { type Draft, keptFrom, otherWork, tab } from "./kept";
+import { type Draft, keptFrom, otherWork, tab, tabOf } from "./kept";
 import type { Builder } from "./useBuilder";
 
 // This tab's work on its way to the server.
@@ -17,6 +17,8 @@ import type { Builder } from "./useBuilder";
 const SENT_AFTER_MS = 1_000;
 /** Studies of which the server has this tab's work, or is about to. */
 const onServer = new Set<string>();
+/** Drafts that were opened in this tab, by study: deleted once the server has the work as this tab's. */
+const opened = new Map<string, Set<string>>();
 
 const path = (study: string, own = tab) => ({ params: { path: { study, tab: own } } });
 
@@ -36,6 +38,10 @@ export function SentDraft({ detail, builder }: { detail: Schemas["StudyDetail"];
         const work = { toml, data: isWhole ? null : data, revision, base: detail.toml };
         const clips = moved && places !== null ? places.map((clip) => ({ ...clip })) : null;
         await unwrap(api.PUT("/api/admin/studies/{study}/drafts/{tab}", { ...path(name), body: { ...work, places: clips } }));
+        for (const draft of opened.get(name) ?? []) {
+          await discard(name, draft);
+          opened.get(name)?.delete(draft);
+        }
       } else if (onServer.delete(name)) await discard(name);
       setState(changed ? "sent" : "");
     } catch {
@@ -69,12 +75,15 @@ export function OfferedDrafts({ detail, onOpen }: OfferProps) {
   const { name } = detail.summary;
   const queries = useQueryClient();
   const stored = useQuery({ ...draftsQuery(name), staleTime: Infinity, gcTime: 0 }).data ?? [];
-  const here = new Set([tab, ...otherWork(name).map(({ key }) => key.split(":").at(-1))]);
+  const here = new Set([tab, ...otherWork(name).map(tabOf), ...(opened.get(name) ?? [])]);
   const offered = stored.flatMap((draft): Draft[] => {
     const work = keptFrom({ ...draft.work, at: draft.at });
     const isNone = work === null || (work.data === null && work.places === null && work.toml === detail.toml);
     return isNone || here.has(draft.tab) ? [] : [{ ...work, key: draft.tab }];
   });
+  const open = (draft: Draft) => {
+    if (onOpen(draft)) opened.set(name, new Set([...(opened.get(name) ?? []), draft.key]));
+  };
   const forget = async (draft: Draft) => {
     await discard(name, draft.key);
     await queries.invalidateQueries({ queryKey: draftsQuery(name).queryKey });
@@ -82,7 +91,7 @@ export function OfferedDrafts({ detail, onOpen }: OfferProps) {
   return offered.map((draft) => (
     <Group key={draft.key} gap="xs" align="start" role="status">
       <span>{`Your unsaved work from ${when(draft.at)}, in another browser, is on the server.`}</span>
-      <Button size="compact-xs" variant="default" onClick={() => onOpen(draft) && void forget(draft)}>
+      <Button size="compact-xs" variant="default" onClick={() => open(draft)}>
         Open the draft
       </Button>
       <ConfirmButton
@@ -146,8 +155,6 @@ export function OtherEditors({ study }: { study: string }) {
     queryKey: ["editors", study],
     queryFn: () => unwrap(api.POST("/api/admin/studies/{study}/editors/{tab}", path(study))),
     refetchInterval: HEARTBEAT_MS,
-    // Also in a tab that is not in front: its work is still open.
-    refetchIntervalInBackground: true,
     gcTime: 0,
   }).data;
   if (editors === undefined || editors.length === 0) return null;
@@ -156,7 +163,7 @@ export function OtherEditors({ study }: { study: string }) {
   );
   return (
     <Text size="sm" role="status">
-      {`Also has this page open: ${words.join("; ")}. Edits of both are kept when you save.`}
+      {`Also has this page open: ${words.join("; ")}. Edits of both are kept when you save; where you both changed a field or moved a clip, you choose.`}
     </Text>
   );
 }

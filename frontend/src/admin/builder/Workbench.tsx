@@ -18,7 +18,7 @@ import { Forms, Texts } from "./Forms";
 import { type Meeting, type MeetingEdit, placeName, withChange } from "./history";
 import { forgetUpload } from "../clips/useUpload";
 import { forgetWork } from "./kept";
-import { type Place, placesToSave } from "./places";
+import { type ClipMeeting, type Place, placesToSave } from "./places";
 import { EXPERIMENT, sectionOf, SECTIONS } from "./schema";
 import { TrialPreview } from "./TrialPreview";
 import { type Builder, BuilderContext, useBuilder, useBuilderHere } from "./useBuilder";
@@ -152,7 +152,7 @@ export function Workbench({ detail, start, meeting }: Props) {
 }
 
 /** What somebody else changed meanwhile, and for each field that both changed, whose words stay. */
-function Met({ meeting: { both, theirs, lostComments = [] }, version }: { meeting: Meeting; version: number }) {
+function Met({ meeting: { both, theirs, lostComments = [], clips }, version }: { meeting: Meeting; version: number }) {
   const builder = useBuilderHere();
   const [taken, setTaken] = useState<readonly string[]>([]);
   const choose = ({ path, mine, theirs: other }: MeetingEdit, whose: string) => {
@@ -160,8 +160,14 @@ function Met({ meeting: { both, theirs, lostComments = [] }, version }: { meetin
     setTaken(whose === "theirs" ? [...taken, path] : taken.filter((one) => one !== path));
     builder.set([], withChange(builder.data, change.at, change.after));
   };
+  const moved = { both: clips?.both ?? [], theirs: clips?.theirs ?? [] };
+  if ([both, theirs, lostComments, moved.both, moved.theirs].every(({ length }) => length === 0)) return null;
   return (
-    <Alert color={both.length > 0 ? "yellow" : "blue"} variant="light" title={`Version ${String(version)} was saved while you edited`}>
+    <Alert
+      color={both.length + moved.both.length > 0 ? "yellow" : "blue"}
+      variant="light"
+      title={`Version ${String(version)} was saved while you edited`}
+    >
       {theirs.length > 0 && (
         <>
           <Text size="sm">Kept from version {version}:</Text>
@@ -179,6 +185,12 @@ function Met({ meeting: { both, theirs, lostComments = [] }, version }: { meetin
           You both changed comments in the TOML. These of yours are not in the merged text: {lostComments.join(" ")}
         </Text>
       )}
+      {moved.theirs.length > 0 && (
+        <Text size="sm" className="wrap-anywhere">
+          Clips where version {version} has them: {namesOf(moved.theirs)}
+        </Text>
+      )}
+      {clips !== undefined && moved.both.length > 0 && <MetClips clips={clips} version={version} />}
       {both.length > 0 && <Text size="sm">You both changed {counted(both.length, "field")}. Choose what stays:</Text>}
       {both.map((edit) => (
         <Stack key={edit.path} gap={4} mt="xs" role="group" aria-label={edit.path}>
@@ -199,6 +211,34 @@ function Met({ meeting: { both, theirs, lostComments = [] }, version }: { meetin
         </Stack>
       ))}
     </Alert>
+  );
+}
+
+/** Clips that both moved: theirs until somebody takes their own, as those would undo moves that are saved. */
+function MetClips({ clips, version }: { clips: ClipMeeting; version: number }) {
+  const { arrange } = useBuilderHere();
+  const [whose, setWhose] = useState("theirs");
+  const choose = (next: string) => {
+    setWhose(next);
+    arrange(next === "mine" ? clips.mine : clips.places);
+  };
+  return (
+    <Stack gap={4} mt="xs" role="group" aria-label="Clips that you both moved">
+      <Text size="sm" className="wrap-anywhere">
+        You both moved clips: {namesOf(clips.both)}. They are where version {version} has them until you choose yours.
+      </Text>
+      <SegmentedControl
+        size="xs"
+        aria-label="Where these clips are"
+        style={{ alignSelf: "flex-start" }}
+        value={whose}
+        onChange={choose}
+        data={[
+          { value: "theirs", label: `Version ${String(version)}` },
+          { value: "mine", label: "Yours" },
+        ]}
+      />
+    </Stack>
   );
 }
 

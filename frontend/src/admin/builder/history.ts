@@ -1,6 +1,6 @@
 /** States of a declaration under edit, with undo and redo; edits of two people that meet. */
 import { type Data, isTable, type Path, pathName, textAt, withDerivedName, withValue } from "./data";
-import { type Place, withRenames } from "./places";
+import { type ClipMeeting, hasOwnNames, type Place, withRenames } from "./places";
 
 /** Clips in cells, null as stored; and those that are stored. */
 type Places = readonly Place[] | null;
@@ -9,6 +9,8 @@ interface State {
   data: Data;
   /** Clips in other cells than stored; null where none was moved. */
   places: Places;
+  /** The declaration whose names the clips have: an earlier one while two levels have one name. */
+  named: Data;
   /** The same as TOML; null until the server has written it. */
   toml: string | null;
   /** What was edited and when, so that typing one word is one step. */
@@ -26,31 +28,32 @@ const ONE_STEP_MS = 1_500;
 const MAX_STEPS = 200;
 
 export function begun(data: Data, toml: string, places: Places = null): History {
-  return { past: [], now: { data, toml, places, edited: "", at: 0 }, future: [] };
+  return { past: [], now: { data, toml, places, named: data, edited: "", at: 0 }, future: [] };
 }
 
 /** Clips after an edit of the declaration: they follow their levels to another name. */
-function following({ now }: History, data: Data, stored: Places): Places {
+function following({ now }: History, data: Data, stored: Places): Pick<State, "places" | "named"> {
   const places = now.places ?? stored ?? [];
-  const next = withRenames(places, now.data, data);
-  return next === places ? now.places : next;
+  const next = withRenames(places, now.named, data, now.named !== now.data);
+  return { places: next === places ? now.places : next, named: hasOwnNames(data) ? data : now.named };
 }
 
 /** One key set to another value (undefined removes it); edits of one key in a row are one step. `saved` is what is stored. */
 export function edited(history: History, path: Path, value: unknown, at: number, saved: unknown = null, stored: Places = null): History {
   const data = withDerivedName(history.now.data, saved, path, value);
-  return stepped(history, { data, toml: null, places: following(history, data, stored), edited: pathName(path), at });
+  return stepped(history, { data, toml: null, ...following(history, data, stored), edited: pathName(path), at });
 }
 
 /** The whole text replaced; `data` is its content. */
 export function rewritten(history: History, toml: string, data: Data, at: number, stored: Places = null): History {
-  return stepped(history, { data, toml, places: following(history, data, stored), edited: "toml", at });
+  return stepped(history, { data, toml, ...following(history, data, stored), edited: "toml", at });
 }
 
 /** Clips put into other cells, and with them perhaps other factors: one step. */
 export function rearranged(history: History, places: Places, data: Data, at: number): History {
   const toml = data === history.now.data ? history.now.toml : null;
-  return stepped(history, { data, toml, places, edited: `clips ${String(at)}`, at });
+  const named = hasOwnNames(data) ? data : history.now.named;
+  return stepped(history, { data, toml, places, named, edited: `clips ${String(at)}`, at });
 }
 
 function stepped(history: History, next: State): History {
@@ -110,6 +113,8 @@ export interface Meeting {
   both: readonly MeetingEdit[];
   /** Comments of mine in the TOML that the merged text lacks, as both changed comments. */
   lostComments?: readonly string[];
+  /** Clips that both moved, or one of us; not there where I moved none. */
+  clips?: ClipMeeting;
 }
 
 /** Edits that began from `base`, brought together. */

@@ -106,6 +106,9 @@ export function keepWork(study: string, work: Omit<Kept, "at">): void {
   }
 }
 
+/** The name on the server of the tab that left a draft in this browser. */
+export const tabOf = (draft: Draft) => draft.key.split(":").at(-1) ?? "";
+
 /** Forget this tab's draft, and none of another tab. */
 export function forgetWork(study: string): void {
   forgetDraft(key(study));

@@ -12,6 +12,8 @@ export interface Place {
   exemplar: number;
   /** The upload that it comes from; null for a clip of the study. */
   upload: string | null;
+  /** Where the version that the work began from has it. */
+  from?: Pick<Place, "levels" | "exemplar">;
 }
 
 /** A place in a cell that one clip fills. */
@@ -32,7 +34,14 @@ const addressOf = (levels: Readonly<Record<string, string>>, exemplar: number, f
   JSON.stringify([...factors.map(({ name }) => levels[name] ?? ""), exemplar]);
 
 export function storedPlaces(clips: readonly Schemas["ClipOut"][]): Place[] {
-  return clips.map(({ clip_sha256, file, levels, exemplar }) => ({ clip_sha256, file, levels, exemplar, upload: null }));
+  return clips.map(({ clip_sha256, file, levels, exemplar }) => ({
+    clip_sha256,
+    file,
+    levels,
+    exemplar,
+    upload: null,
+    from: { levels, exemplar },
+  }));
 }
 
 export function factorsOf(data: Data): Factor[] {
@@ -42,23 +51,25 @@ export function factorsOf(data: Data): Factor[] {
   }));
 }
 
-const MAX_SLOTS = 5_000;
+/** The server's limits. */
+const [MAX_SLOTS, MAX_PER_CELL] = [5_000, 1_000];
 
 /** Every place of the design, in the order of its cells: the last factor changes fastest. */
 export function slotsOf(data: Data): Slot[] {
   const factors = factorsOf(data);
   if (factors.length === 0) return [];
-  const perCell = Math.min(Math.max(1, Number(tableAt(data, ["exemplars"])["per_cell"] ?? 1) || 1), 100);
+  const perCell = Math.min(Math.max(1, Number(tableAt(data, ["exemplars"])["per_cell"] ?? 1) || 1), MAX_PER_CELL);
   let cells: Record<string, string>[] = [{}];
   for (const { name, levels } of factors)
-    cells = cells.flatMap((cell) => levels.map((level) => ({ ...cell, [name]: level }))).slice(0, MAX_SLOTS);
-  return cells.flatMap((levels) =>
+    cells = cells.flatMap((cell) => levels.map((level) => ({ ...cell, [name]: level }))).slice(0, Math.ceil(MAX_SLOTS / perCell));
+  const slots = cells.flatMap((levels) =>
     Array.from({ length: perCell }, (_, index) => ({
       levels,
       exemplar: index + 1,
       name: `${factors.map(({ name }) => levels[name] ?? "").join("/")}, no. ${String(index + 1)}`,
     })),
   );
+  return slots.slice(0, MAX_SLOTS);
 }
 
 export interface Arrangement {
@@ -107,17 +118,28 @@ export function reconciled(places: readonly Place[], known: readonly Place[]): P
   return [...present, ...known.filter((one) => !places.some((member) => isClip(one, member)))];
 }
 
-/** `places` after an edit of the declaration: a factor or level that got another name keeps its clips. */
-export function withRenames(places: readonly Place[], before: Data, after: Data): readonly Place[] {
+/** Whether no two factors, and no two levels of one, have one name; while one is typed it may be that of another. */
+export function hasOwnNames(data: Data): boolean {
+  const factors = factorsOf(data);
+  return [factors.map(({ name }) => name), ...factors.map(({ levels }) => levels)].every((names) => new Set(names).size === names.length);
+}
+
+/**
+ * `places` after an edit of the declaration: a factor or level that got another name keeps its clips. Names are taken by
+ * their positions where two were alike in between, as then nothing was put into another order.
+ */
+export function withRenames(places: readonly Place[], before: Data, after: Data, byPosition = false): readonly Place[] {
+  if (!hasOwnNames(after)) return places;
   const [old, fresh] = [factorsOf(before), factorsOf(after)];
   const factors = renames(
     old.map(({ name }) => name),
     fresh.map(({ name }) => name),
+    byPosition,
   );
   const levels = new Map<string, Map<string, string>>();
   for (const [position, { name, levels: names }] of old.entries()) {
     const next = old.length === fresh.length ? fresh[position] : fresh.find((one) => one.name === name);
-    if (next !== undefined) levels.set(name, renames(names, next.levels));
+    if (next !== undefined) levels.set(name, renames(names, next.levels, byPosition));
   }
   const renamed = places.map((member) => {
     const own = Object.entries(member.levels);
@@ -140,12 +162,102 @@ export function isAsStored(places: readonly Place[], stored: readonly Place[], d
   return all(places) === all(stored);
 }
 
+// Clips that two people moved.
+
+export interface ClipMeeting {
+  /** Files that both moved, each to another place, or that are after one place: for now where they put them. */
+  both: readonly string[];
+  /** Files that only they moved: kept. */
+  theirs: readonly string[];
+  /** Every clip, those of `both` where they put them. */
+  places: readonly Place[];
+  /** Every clip, those of `both` where I put them. */
+  mine: readonly Place[];
+}
+
+/** The declarations of the version that the work began from, of the work, and of what somebody else saved. */
+interface Declarations {
+  base: Data;
+  mine: Data;
+  theirs: Data;
+}
+
+/**
+ * My places brought together with what is stored now. Clips and places are taken by groups: a swap is a group, and so are
+ * two swaps that share a clip or a place. A group that only one of us moved is as they left it, so no clip loses its place.
+ */
+export function meetingOfClips(
+  mine: readonly Place[],
+  stored: readonly Place[],
+  { base, mine: my, theirs: their }: Declarations,
+): ClipMeeting {
+  const factors = factorsOf(my);
+  const fromTheirs = withRenames(stored, base, my);
+  const fromMine = withRenames(mine, base, their);
+  const origins = mine.map((member): Place => ({ ...member, ...(member.from ?? { exemplar: 0 }) }));
+  const before = withRenames(withRenames(origins, base, their), base, my);
+  const addressIn = (one: Place | undefined) =>
+    one === undefined || one.exemplar === 0 ? "" : addressOf(one.levels, one.exemplar, factors);
+  const clips = [...fromMine, ...fromTheirs.filter((one) => !fromMine.some((member) => isClip(member, one)))].map((clip) => {
+    const other = fromTheirs.find((one) => isClip(one, clip));
+    const own = fromMine.find((one) => isClip(one, clip)) ?? clip;
+    const at = [before.find((one) => isClip(one, clip)), own, other].map(addressIn) as [string, string, string];
+    return { clip, own, other, at, isMine: fromMine.includes(clip) && at[1] !== at[0], isTheirs: at[2] !== at[0] };
+  });
+  const both = new Set<string>();
+  const groups = groupsOf(clips, ({ at }) => at.filter((address) => address !== ""));
+  const met = new Set(
+    groups.filter((group) => {
+      const merged = group.map(({ at, isMine }) => (isMine ? at[1] : at[2])).filter((address) => address !== "");
+      const isMet = (one: (typeof clips)[number]) => one.isMine && one.isTheirs && one.at[1] !== one.at[2];
+      const isCrowded = new Set(merged).size < merged.length;
+      if (!isCrowded && !group.some(isMet)) return false;
+      for (const one of group) if (isMet(one) || (isCrowded && (one.isMine || one.isTheirs))) both.add(one.clip.file);
+      return true;
+    }),
+  );
+  const arranged = (isMineFirst: boolean) =>
+    groups.flatMap((group) =>
+      group.flatMap(({ clip, own, other, isMine }): Place[] => {
+        // A clip that they took out of the study is not there to be put anywhere.
+        if (other === undefined) return clip.upload === null ? [] : [met.has(group) && !isMineFirst ? { ...own, exemplar: 0 } : own];
+        const taken = (met.has(group) ? isMineFirst && fromMine.includes(clip) : isMine) ? own : other;
+        return [{ ...other, levels: taken.levels, exemplar: taken.exemplar }];
+      }),
+    );
+  const theirs = clips.filter(({ clip, isMine, isTheirs }) => isTheirs && !isMine && !both.has(clip.file) && clip.upload === null);
+  return { both: [...both], theirs: theirs.map(({ clip }) => clip.file), places: arranged(false), mine: arranged(true) };
+}
+
+/** Members that share a key, directly or by others, together. */
+function groupsOf<T>(members: readonly T[], keys: (member: T) => readonly string[]): T[][] {
+  const groups: { keys: Set<string>; members: T[] }[] = [];
+  for (const member of members) {
+    const own = keys(member);
+    const touching = groups.filter((group) => own.some((key) => group.keys.has(key)));
+    const joined = {
+      keys: new Set([...own, ...touching.flatMap((group) => [...group.keys])]),
+      members: [...touching.flatMap((group) => group.members), member],
+    };
+    groups.splice(0, groups.length, ...groups.filter((group) => !touching.includes(group)), joined);
+  }
+  return groups.map((group) => group.members);
+}
+
 /** Old names with the new ones at the same positions, where nothing came or went and no name moved. */
-function renames(before: readonly string[], after: readonly string[]): Map<string, string> {
+function renames(before: readonly string[], after: readonly string[], byPosition: boolean): Map<string, string> {
   if (before.length !== after.length) return new Map();
   const pairs = before.flatMap((name, index): [string, string][] => (after[index] === name ? [] : [[name, after[index] ?? ""]]));
-  const isOther = pairs.every(([name, next]) => !after.includes(name) && !before.includes(next));
+  const isOther = byPosition || pairs.every(([name, next]) => !after.includes(name) && !before.includes(next));
   return new Map(isOther ? pairs : []);
+}
+
+/** The numbers that files of one cell have, where each has another from 1 on; else they are counted in the order of their marks. */
+function numbersOf(marks: readonly string[]): number[] {
+  const numbers = marks.map((mark) => (/^\d+$/.test(mark) ? Number(mark) : 0));
+  if (numbers.every((number) => number >= 1 && number <= MAX_PER_CELL) && new Set(numbers).size === numbers.length) return numbers;
+  const order = [...marks.keys()].sort((a, b) => (numbers[a] ?? 0) - (numbers[b] ?? 0) || a - b);
+  return [...marks.keys()].map((index) => order.indexOf(index) + 1);
 }
 
 /** Factors, levels, clips per cell and every place, as a pattern reads them from the names of files. */
@@ -158,21 +270,31 @@ export function filledByPattern(places: readonly Place[], data: Data, pattern: s
     ).map(({ file, levels }) => [file, levels]),
   );
   const named = fields.filter((field) => field !== "exemplar");
-  const taken = new Map<string, number>();
-  const next = [...places]
-    .sort((a, b) => a.file.localeCompare(b.file, "en", { numeric: true }))
-    .map((member): Place => {
-      const matches = read.get(member.file) ?? null;
-      if (matches === null) return member;
-      const own = Object.fromEntries(fields.map((field, index) => [field, matches[index] ?? ""]));
+  const cells = new Map<string, { member: Place; own: Record<string, string> }[]>();
+  const strays: Place[] = [];
+  for (const member of [...places].sort((a, b) => a.file.localeCompare(b.file, "en", { numeric: true }))) {
+    const matches = read.get(member.file) ?? null;
+    if (matches === null) {
+      strays.push(member);
+      continue;
+    }
+    const own = Object.fromEntries(fields.map((field, index) => [field, matches[index] ?? ""]));
+    const cell = JSON.stringify(named.map((field) => own[field]));
+    cells.set(cell, [...(cells.get(cell) ?? []), { member, own }]);
+  }
+  const fitting = [...cells.values()].flatMap((members) => {
+    const numbers = numbersOf(members.map(({ own }) => own["exemplar"] ?? ""));
+    return members.map(({ member, own }, index): Place => {
       const levels = Object.fromEntries(named.map((field) => [field, own[field] ?? ""]));
-      const cell = JSON.stringify(named.map((field) => levels[field]));
-      taken.set(cell, (taken.get(cell) ?? 0) + 1);
-      return { ...member, levels: { ...member.levels, ...levels }, exemplar: taken.get(cell) ?? 1 };
+      return { ...member, levels: { ...member.levels, ...levels }, exemplar: numbers[index] ?? 1 };
     });
+  });
+  // Of two clips for one place the first is in it: one that fits comes before one that was there.
+  const next = [...fitting, ...strays];
   const known = listAt(data, ["factors"]);
-  const factors = named.map((name) => {
-    const declared = known.find((factor) => textAt(factor, ["name"]) === name);
+  const knownNames = known.map((factor) => textAt(factor, ["name"]));
+  const fill = (name: string) => {
+    const declared = known[knownNames.indexOf(name)];
     const levels = listAt(declared, ["levels"]);
     const names = new Set(levels.map((level) => textAt(level, ["name"])));
     const fresh = [...new Set(next.flatMap((member) => member.levels[name] ?? []))].filter((level) => !names.has(level));
@@ -180,9 +302,12 @@ export function filledByPattern(places: readonly Place[], data: Data, pattern: s
       ...(isTable(declared) ? declared : { name, label: `${name.charAt(0).toUpperCase()}${name.slice(1).replaceAll("_", " ")}` }),
       levels: [...levels, ...fresh.map((level) => ({ name: level, label: level }))],
     };
-  });
-  const others = known.filter((factor) => !named.includes(textAt(factor, ["name"])));
-  const perCell = Math.max(1, ...taken.values());
-  const withFactors = withValue(data, ["factors"], [...others, ...factors]);
+  };
+  const factors = [
+    ...known.map((factor, index) => (named.includes(knownNames[index] ?? "") ? fill(knownNames[index] ?? "") : factor)),
+    ...named.filter((name) => !knownNames.includes(name)).map(fill),
+  ];
+  const perCell = fitting.reduce((most, { exemplar }) => Math.max(most, exemplar), 1);
+  const withFactors = withValue(data, ["factors"], factors);
   return { data: withValue(withFactors, ["exemplars", "per_cell"], perCell) as Data, places: next };
 }
