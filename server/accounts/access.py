@@ -1,5 +1,6 @@
 """Who is asking, a browser or an API token, and what each may do: dependencies of endpoints."""
 
+import re
 from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import Annotated
@@ -30,6 +31,8 @@ from server.models import ROLES, Account, AdminSession, Role
 
 COOKIE = "palpebra_session"
 _SEEN_EVERY = timedelta(minutes=1)
+_BY_ITSELF = re.compile(r"/editors/[^/]+$")
+"""What an open page asks by itself: no sign that somebody is there."""
 _NO_SUCH = "This API token is unknown, revoked or expired. Create a new one."
 
 
@@ -87,10 +90,12 @@ def _recognized_identity(request: Request, database: Database, settings: Setting
     if not cookie:
         raise NotSignedIn("Please sign in.")
     check_origin(request, settings)
-    return _by_cookie(database, settings.session_idle, cookie)
+    return _by_cookie(
+        database, settings.session_idle, cookie, is_used=not _BY_ITSELF.search(request.url.path)
+    )
 
 
-def _by_cookie(database: Database, session_idle: timedelta, cookie: str) -> Identity:
+def _by_cookie(database: Database, session_idle: timedelta, cookie: str, *, is_used: bool) -> Identity:
     with database.read() as session:
         signed_in = repository.session_by_token(session, hash_token(cookie))
         since = now() - session_idle
@@ -107,7 +112,7 @@ def _by_cookie(database: Database, session_idle: timedelta, cookie: str) -> Iden
             second_factor=signed_in.second_factor,
             signed_in_at=signed_in.created_at,
         )
-        stale = now() - signed_in.last_seen_at > _SEEN_EVERY
+        stale = is_used and now() - signed_in.last_seen_at > _SEEN_EVERY
     if stale:
         with database.write() as session:
             if (row := repository.session_of(session, identity.account_id, identity.session_id)) is not None:

@@ -110,7 +110,7 @@ class Clip(Base):
 
 
 class BuilderDraft(Base):
-    """One tab in which somebody has the builder of a study open, and her unsaved work there.
+    """One tab in which somebody has the builder of a study open, and the unsaved work there.
 
     Attributes
     ----------

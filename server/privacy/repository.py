@@ -4,12 +4,13 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, Select, Table, func, select
+from sqlalchemy import ColumnElement, Select, Table, delete, func, select
 from sqlalchemy.orm import Session
 
 from server.core.values import storable_value
 from server.models import (
     Base,
+    BuilderDraft,
     IdentityKey,
     Link,
     RecruiterIdentity,
@@ -24,6 +25,12 @@ from server.participation.identity_keys import identifier_hash
 from server.participation.recruiter import Recruiter
 from server.participation.visit_repository import of_personal_link
 from server.privacy.rows import time_text
+
+
+def delete_drafts(session: Session, before: datetime) -> None:
+    """Delete unsaved work of the builder that was not changed since then."""
+    session.execute(delete(BuilderDraft).where(BuilderDraft.saved_at < before))
+
 
 # Everything that is stored of a visit, whatever table it is in.
 

@@ -207,6 +207,8 @@ def _declares_period(session: Session, study: Study) -> bool:
 # The hourly erasure that the server makes by itself.
 
 FIRST_LOOK_S, LOOK_EVERY_S = 120.0, 3600.0
+DRAFTS_FOR = timedelta(days=90)
+"""Unsaved work of the builder that nobody changed for so long is deleted."""
 
 
 def hourly_retention(
@@ -235,13 +237,15 @@ def carry_out_alone(database: Database, settings: Settings, locks: Locks, stoppe
 
 
 def every_study(database: Database, settings: Settings, stopped: Stopped) -> None:
-    """Erase what is due of each study that declares a period, and log it.
+    """Erase what is due of each study that declares a period, and log it; delete old drafts of the builder.
 
     Parameters
     ----------
     stopped : callable
         Asked between two transactions; once true no further one begins.
     """
+    with database.write() as session:
+        repository.delete_drafts(session, now() - DRAFTS_FOR)
     with database.read() as session:
         studies = studies_with_period(session)
     for study in studies:

@@ -426,6 +426,10 @@ def add_definition(
         of_clips = clip_findings(*stored.find_faults(new, CLIPS_WITHIN_S))
     with database.write() as session:
         study = for_edit(session, name, order.revision, identity, "edit")
+        if study.status == "live" and not is_live:  # its new clips were not decoded
+            raise Conflict(
+                "Not saved: the study was set live meanwhile. Save again; its clips are checked then."
+            )
         manifest = active_manifest(session, study)
         if order.places is not None:
             manifest = own_clips.placed_manifest(manifest, added, order.places, experiment)

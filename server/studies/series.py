@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from difflib import SequenceMatcher
 from itertools import groupby
 from operator import itemgetter
@@ -11,7 +11,7 @@ from typing import Any, Literal
 from sqlalchemy.orm import Session
 
 from experiments.declaration.experiment import Experiment
-from experiments.manifest import Manifest
+from experiments.manifest import Clip, Manifest
 from experiments.schema.difference import Change, changes_what_is_measured, difference
 from server.accounts.identity import Identity
 from server.core.errors import NotFound
@@ -100,7 +100,7 @@ def effects_of_edit(
     """What saving this definition as a further version would do to the answers that are stored."""
     present = active_version(session, study)
     known = Manifest.model_validate(present.manifest).clips
-    clips = before = {(clip.cell, clip.exemplar, clip.sha256) for clip in known}
+    clips = {(clip.cell, clip.exemplar, clip.sha256) for clip in known}
     if places is not None:
         order = experiment.factor_names
         clips = {
@@ -113,8 +113,7 @@ def effects_of_edit(
         ChangeOut(path=change.path, effect=change.effect, text=str(change))
         for change in difference(definition_of(present), experiment)
     ]
-    if moved := len(clips - before):
-        words = "1 cell gets another clip" if moved == 1 else f"{moved} places in cells get other clips"
+    if places is not None and (words := _moves_in_words(known, definition_of(present), places, experiment)):
         changes.append(ChangeOut(path="clips", effect="measured", text=words))
     return JudgedEdit(
         changes=changes,
@@ -123,6 +122,46 @@ def effects_of_edit(
         runs=runs,
         begins_series=bool(runs) and series not in {version.series for version in study.versions},
     )
+
+
+def _moves_in_words(
+    known: Sequence[Clip], before: Experiment, places: list[PlacedClip], after: Experiment
+) -> str:
+    """How many places get other clips, or how many clips go; empty where neither.
+
+    Clips of a factor or level that only got another name stay where they are.
+    """
+    factors = _renamed(before.factor_names, after.factor_names)
+    levels = {
+        old.name: _renamed([one.name for one in old.levels], [one.name for one in new.levels])
+        for old in before.factors
+        for new in after.factors
+        if new.name == factors[old.name]
+    }
+
+    def placed(at: dict[str, str], exemplar: int, sha256: str) -> tuple[tuple[str, ...], int, str]:
+        return tuple(at.get(name, "") for name in after.factor_names), exemplar, sha256
+
+    old_places = set()
+    for clip in known:
+        at = {
+            factors.get(name, name): levels.get(name, {}).get(one, one) for name, one in clip.levels.items()
+        }
+        old_places.add(placed(at, clip.exemplar, clip.sha256))
+    new_places = {placed(clip.levels, clip.exemplar, clip.clip_sha256) for clip in places}
+    if moved := len(new_places - old_places):
+        return "1 cell gets another clip" if moved == 1 else f"{moved} places in cells get other clips"
+    gone = len(old_places - new_places)
+    return "" if gone == 0 else "1 clip is removed" if gone == 1 else f"{gone} clips are removed"
+
+
+def _renamed(old: Sequence[str], new: Sequence[str]) -> dict[str, str]:
+    """Each old name with the new one at its position; names that only moved, or came or went, stay."""
+    fits = len(old) == len(new)
+    return {
+        name: new[position] if fits and name not in new and new[position] not in old else name
+        for position, name in enumerate(old)
+    }
 
 
 # Two texts as one: words that stayed, went and came.

@@ -21,6 +21,7 @@ from server.accounts.workspace_repository import studies_opened_to
 from server.accounts.workspaces import Standing, place_of_copy, standing_of, standing_on
 from server.core.db import Database
 from server.core.errors import Conflict, Invalid
+from server.core.repository import insert_once
 from server.core.storage import clip_address
 from server.core.values import now
 from server.models import BuilderDraft, Study, StudyVersion, VersionClip
@@ -340,13 +341,13 @@ OPEN_FOR = timedelta(seconds=45)
 """After this without a sign of life a tab counts as closed; pages send one every 15 s."""
 MAX_DRAFTS = 10
 """Drafts of one person on one study; the oldest go."""
+MAX_DRAFT_BYTES = 1_000_000
 
 
 def _own_tab(session: Session, study: Study, identity: Identity, tab: str) -> BuilderDraft:
-    row = repository.builder_tab(session, study, identity.account_id, tab)
-    if row is None:
-        row = BuilderDraft(study_id=study.id, account_id=identity.account_id, tab=tab)
-        session.add(row)
+    key = {"study_id": study.id, "account_id": identity.account_id, "tab": tab}
+    insert_once(session, BuilderDraft, [key | {"seen_at": now()}])  # two requests of a new tab may meet
+    row = session.get_one(BuilderDraft, tuple(key.values()))
     row.seen_at = now()
     return row
 
@@ -370,6 +371,9 @@ def other_editors(session: Session, name: str, tab: str, identity: Identity) -> 
 def save_draft(session: Session, name: str, tab: str, draft: BuilderWork, identity: Identity) -> None:
     """Keep the unsaved work of a tab in the place of what it kept before."""
     study = find_study(session, name, identity, "edit")
+    size = len(draft.model_dump_json())
+    if size > MAX_DRAFT_BYTES:
+        raise Invalid(f"expected a draft of at most {MAX_DRAFT_BYTES:,} bytes, got {size:,}; save a version")
     row = _own_tab(session, study, identity, tab)
     row.draft, row.saved_at = draft.model_dump(mode="json"), now()
     session.flush()

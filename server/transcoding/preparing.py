@@ -126,6 +126,8 @@ class UploadPreparation:
 # Clips as the store holds them: each is there, whole, and decodes to the frames its manifest declares.
 
 LONGEST_S_A_CLIP = 120.0
+HANGS_AFTER_S = 50.0
+"""Of one clip where somebody waits: most of the time there is; else each further try would begin with it."""
 AT_ONCE = 64
 """Clips of one process: starting one takes as long as a dozen short clips."""
 RATE_TOLERANCE = 0.02
@@ -181,7 +183,8 @@ class StoredClips:
         ----------
         clips : sequence of Clip or CheckClip
         within_s : float
-            No clip is begun after this time, in s.
+            After this time, in s, no clip is begun and the one being decoded is given up: it is left for the
+            next call. One that alone took `HANGS_AFTER_S` is reported as undecodable.
 
         Returns
         -------
@@ -225,7 +228,8 @@ class StoredClips:
             elif self._known.get(_key(clip)) or _key(clip) not in self._known:
                 # A fault is looked at again: the clip may have been brought back.
                 asked[_key(clip)] = clip
-        waiting = list(asked.values())
+        # Last, as one that takes all of the time would keep it from the others each time.
+        waiting = sorted(asked.values(), key=lambda clip: _key(clip) in self._known)
         while waiting and time.monotonic() < ends:
             done = self._examine_in_process(waiting[:AT_ONCE], ends)
             for clip, faults in done:
@@ -238,12 +242,13 @@ class StoredClips:
     ) -> list[tuple[Clip | CheckClip, tuple[ClipFault, ...]]]:
         """The first clips with what is wrong with them.
 
-        At least one, as the process may end at a bad one; fewer only where the time is over at `ends`.
+        At least one, as the process may end at a bad one; none only where the time is over at `ends` and the
+        first clip had less than `HANGS_AFTER_S` of it.
         """
         with ExitStack() as held:
             orders = [{"path": str(self._path(clip, held)), **_expected(clip)} for clip in clips]
             longest_s = LONGEST_S_A_CLIP * len(clips)
-            is_cut = False
+            is_cut, began = False, time.monotonic()
             try:
                 answer = subprocess.run(
                     [sys.executable, "-m", "server.transcoding.preparing"],
@@ -261,9 +266,11 @@ class StoredClips:
             (clip, tuple(ClipFault(kind, clip.file, detail) for kind, detail in faults))
             for clip, faults in zip(clips, lines, strict=False)
         ]
-        if len(done) < len(clips) and not is_cut:
+        hangs = is_cut and not done and time.monotonic() - began >= HANGS_AFTER_S
+        if len(done) < len(clips) and (hangs or not is_cut):
             stopped = clips[len(done)]
-            fault = ClipFault("undecodable", stopped.file, "it stopped the decoder")
+            words = "decoding it took too long" if hangs else "it stopped the decoder"
+            fault = ClipFault("undecodable", stopped.file, words)
             done.append((stopped, (fault,)))
         return done
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import io
+import os
 import shutil
 import time
 from pathlib import Path
@@ -19,6 +20,7 @@ from server.core.storage import FolderStore
 from server.models import Job, Study, StudyVersion
 from server.operations.doctor import Finding
 from server.rehearsals.service import of_finding
+from server.studies import creation
 from server.studies.creation import store_clips
 from server.transcoding.preparing import StoredClips
 from tests.helpers.admins import Admin
@@ -453,3 +455,49 @@ def test_a_batch_of_clips_is_cut_at_the_end_of_its_time(services: Services, tmp_
     assert time.monotonic() - began < 5
     assert faults == []  # a clip at which the time was over is not at fault
     assert left > 0
+
+
+def test_a_clip_that_hangs_the_decoder_gets_the_fault_and_the_others_their_turn(
+    services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "clips"
+    manifest = make_clip_folder(parse_experiment(READY), folder, frames=5)
+    store_clips(services.clips, manifest, folder)
+    pipe = tmp_path / "hangs.mp4"
+    os.mkfifo(pipe)  # whoever opens it waits for somebody to write
+    path_of = StoredClips._path
+    first = manifest.clips[0]
+    monkeypatch.setattr(
+        StoredClips, "_path", lambda self, clip, held: pipe if clip == first else path_of(self, clip, held)
+    )
+    monkeypatch.setattr("server.transcoding.preparing.HANGS_AFTER_S", 5.0)
+    stored = StoredClips(services.clips)
+    none = stored.find_faults(manifest.clips, 1.0)
+    assert none == ([], len(manifest.clips))  # so little time is no proof
+    faults, left = stored.find_faults(manifest.clips, 6.0)
+    assert [(fault.file, fault.detail) for fault in faults] == [(first.file, "decoding it took too long")]
+    assert left == len(manifest.clips) - 1
+    faults, left = stored.find_faults(manifest.clips, 6.0)
+    # The others come first; there was no time to try the one at fault again.
+    assert ([fault.file for fault in faults], left) == ([first.file], 1)
+
+
+def test_a_version_saved_while_the_study_is_set_live_is_refused(
+    owner: Admin, services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its new clips were not decoded, as the study was a draft when that was decided."""
+    add_study(services, tmp_path / "clips", READY, status="draft")
+    planned = creation.planned_experiment
+
+    def set_live_meanwhile(text: str) -> Any:
+        with services.database.write() as session:
+            session.query(Study).one().status = "live"
+        return planned(text)
+
+    body = {"revision": owner.get("/studies/short").json()["summary"]["revision"], "toml": READY}
+    monkeypatch.setattr(creation, "planned_experiment", set_live_meanwhile)
+    refused = owner.send("POST", "/studies/short/versions", body)
+    assert (refused.status_code, refused.json()["error"]["code"]) == (409, "conflict")
+    assert "was set live meanwhile" in refused.json()["error"]["message"]
+    monkeypatch.setattr(creation, "planned_experiment", planned)
+    assert owner.send("POST", "/studies/short/versions", body).status_code == 201

@@ -4,21 +4,16 @@ import re
 import time
 import tomllib
 import zipfile
-from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
-from sqlalchemy import select
 
 from experiments.load import parse_experiment
 from server.context import Services
-from server.core.values import now
-from server.models import BuilderDraft
 from server.results import demo_builds
-from server.studies.service import MAX_DRAFTS, OPEN_FOR
-from tests.helpers.admins import Admin, signed_in
+from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 from tests.helpers.tiny_clips import encoded_video, make_clip_folder
 from tests.helpers.uploads import upload
@@ -157,40 +152,6 @@ def test_a_version_takes_further_clips_and_others_in_their_place(experimenter: A
     assert [series["versions"] for series in saved.json()["series"]] == [[1], [2]]
 
 
-def test_drafts_are_kept_per_person_and_tab_and_editors_are_named(
-    client: TestClient, services: Services, experimenter: Admin, study: StudyInDatabase
-) -> None:
-    other = signed_in(client, services, "owner", "bea")
-    work = {"toml": "title = 'mine'", "data": None, "revision": 1, "base": "title = 'was'", "places": None}
-    assert experimenter.send("POST", "/studies/short/editors/tab-1").json() == []
-    assert experimenter.send("PUT", "/studies/short/drafts/tab-1", work).status_code == 204
-    assert experimenter.send("PUT", "/studies/short/drafts/tab-2", work | {"revision": 2}).status_code == 204
-    assert [draft["tab"] for draft in experimenter.get("/studies/short/drafts").json()] == ["tab-2", "tab-1"]
-    assert experimenter.get("/studies/short/drafts").json()[1]["work"] == work
-    assert other.get("/studies/short/drafts").json() == []
-    assert experimenter.send("POST", "/studies/short/editors/tab-1").json() == [
-        {"name": experimenter.name, "own": True, "edits": True}
-    ]
-    assert other.send("POST", "/studies/short/editors/tab-9").json() == [
-        {"name": experimenter.name, "own": False, "edits": True}
-    ]
-    assert experimenter.send("DELETE", "/studies/short/drafts/tab-2").status_code == 204
-    assert experimenter.send("DELETE", "/studies/short/drafts/no-tab").status_code == 204
-    assert [draft["tab"] for draft in experimenter.get("/studies/short/drafts").json()] == ["tab-1"]
-    # Tabs that nothing was heard of for a while are not named; their drafts stay.
-    with services.database.write() as session:
-        for row in session.scalars(select(BuilderDraft)):
-            row.seen_at = now() - OPEN_FOR - timedelta(seconds=1)
-    assert other.send("POST", "/studies/short/editors/tab-9").json() == []
-    assert [draft["tab"] for draft in experimenter.get("/studies/short/drafts").json()] == ["tab-1"]
-    for number in range(MAX_DRAFTS + 2):
-        experimenter.send("PUT", f"/studies/short/drafts/more-{number}", work)
-    kept = {draft["tab"] for draft in experimenter.get("/studies/short/drafts").json()}
-    assert kept == {f"more-{number}" for number in range(2, MAX_DRAFTS + 2)}
-    viewer = signed_in(client, services, "viewer", "vera")
-    assert viewer.send("PUT", "/studies/short/drafts/tab-1", work).status_code == 403
-
-
 def test_clips_change_cells_and_come_from_an_upload_into_cells(experimenter: Admin) -> None:
     made = own_study(experimenter)
     clips = {clip["file"]: clip for clip in experimenter.get("/studies/faces/clips").json()}
@@ -210,6 +171,16 @@ def test_clips_change_cells_and_come_from_an_upload_into_cells(experimenter: Adm
     judged = experimenter.send("POST", "/studies/faces/versions/check", body).json()
     assert [change["text"] for change in judged["changes"]] == ["2 places in cells get other clips"]
     assert judged["series"] == 2
+    renamed = {"toml": made["toml"].replace('"fast"', '"quick"'), "places": []}
+    for clip in clips.values():
+        speed = "quick" if clip["levels"]["speed"] == "fast" else clip["levels"]["speed"]
+        renamed["places"].append(place(clip["file"], speed, clip["levels"]["mood"], clip["exemplar"]))
+    check = "/studies/faces/versions/check"
+    paths = [change["path"] for change in experimenter.send("POST", check, renamed).json()["changes"]]
+    assert paths
+    assert "clips" not in paths  # a level with another name keeps its clips
+    fewer = experimenter.send("POST", check, {"toml": made["toml"], "places": stay}).json()
+    assert [change["text"] for change in fewer["changes"]] == ["2 clips are removed"]
     body["revision"] = made["summary"]["revision"]
     saved = experimenter.send("POST", "/studies/faces/versions", body)
     assert saved.status_code == 201, saved.text
