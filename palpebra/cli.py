@@ -58,7 +58,7 @@ def with_start(arguments: list[str]) -> list[str]:
 
 
 def main() -> None:
-    """Run one command."""
+    """Run one command. What it writes (database, clips, uploads) is for its own user alone."""
     arguments = sys.argv[1:]
     if arguments[:1] == ["--version"]:
         print(f"palpebra {metadata.version('palpebra')}")
@@ -71,7 +71,11 @@ def main() -> None:
         import_module(PROGRAMS[arguments[0]]).main()
         return
     sys.argv = [sys.argv[0], *with_start(arguments)]
-    run_command_line(_checked_app)
+    before = os.umask(0o077)
+    try:
+        run_command_line(_checked_app)
+    finally:
+        os.umask(before)
 
 
 def _checked_app(**settings: object) -> object:

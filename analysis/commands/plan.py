@@ -1,5 +1,6 @@
 """`analysis plan`: how many participants, clips and faces a study needs, before data collection."""
 
+import sys
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
@@ -164,6 +165,15 @@ def pairs(
 
     design = PairsDesign(numbers_in(abilities, "--abilities"), repeats, sd_rater, tie)
     simulate(design, "paired comparisons", (n, simulations, alpha, target, seed), plot, json)
+    _warn_of_likeness("--sd-rater", sd_rater)
+
+
+def _warn_of_likeness(option: str, sd: float) -> None:
+    if sd == 0:
+        sys.stderr.write(
+            f"warning: {option} is 0, as if everybody had the same effect, which finds too few people; "
+            "estimate it from a pilot\n"
+        )
 
 
 def thresholds(
@@ -191,7 +201,7 @@ def thresholds(
 
     Examples:
 
-      analysis plan thresholds --levels 100,120,140,160 --threshold 130 --difference 8 --spread 12
+      analysis plan thresholds --levels 90,120,140 --threshold 120 --difference 9 --spread 9 --sd-difference 7
     """
     from analysis.power.choices import ThresholdDesign
 
@@ -200,6 +210,7 @@ def thresholds(
         guess, lapse, function.value, seed,
     )  # fmt: skip
     simulate(design, "thresholds", (n, simulations, alpha, target, seed), plot, json)
+    _warn_of_likeness("--sd-difference", sd_difference)
 
 
 plan = command_group(

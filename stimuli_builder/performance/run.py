@@ -285,7 +285,7 @@ GAZE_DEG_MAX = 60.0
 SHIFT_DEG_PER_S = 80.0
 """Eyes that turn faster make a saccade; pursuit of what moves is slower."""
 SHIFT_DEG_MIN = 3.0
-"""Smaller saccades bring no blink (Evinger and others 1994), and are hard to tell from noise."""
+"""Smaller saccades bring no blink (Evinger and others 1994), and look like noise."""
 GAZE_HZ = 200
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from experiments.errors import InputError
+from palpebra import cli
 from palpebra.cli import with_start
 from palpebra.conflicts import refuse_foreign_packages
 from palpebra.folders import data_folder, free_port
@@ -190,3 +191,18 @@ def answers(port: int, path: str) -> bool:
             return bool(answer.status == 200)
     except OSError:
         return False
+
+
+def test_what_the_program_writes_is_for_its_own_user_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    masks = []
+
+    def noted(**_: object) -> int:
+        masks.append(os.umask(0o022))
+        os.umask(masks[-1])
+        return 0
+
+    monkeypatch.setattr(cli, "_checked_app", noted)
+    monkeypatch.setattr("sys.argv", ["palpebra", "--no-browser"])
+    with pytest.raises(SystemExit):
+        cli.main()
+    assert masks == [0o077]

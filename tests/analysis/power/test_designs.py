@@ -276,7 +276,7 @@ def call(capsys, monkeypatch, tmp_path):
         "mixed --difference 0.3,0.6 --clips 6",
         "ordinal --difference 0.3,0.6 --shares 1,2,1 --clips 3",
         "pairs --abilities 0,0.3,0.6 --sd-rater 0.4 --tie 0.2",
-        "thresholds --levels 100,120,140 --threshold 120 --difference 10 --spread 10 --sd-people 5",
+        "thresholds --levels 100,120,140 --threshold 120 --difference 10 --spread 10 --sd-people 5 --sd-difference 4",
     ],
 )
 def test_the_commands_write_table_text_figure_and_json(call, tmp_path, monkeypatch, arguments) -> None:
@@ -325,3 +325,17 @@ def test_bad_input_is_one_line_and_exit_code_2(call, arguments, said) -> None:
 def test_a_factor_in_two_roles_is_refused() -> None:
     with pytest.raises(InputError, match="both within and between"):
         FactorialDesign({"a": 2}, {"a": 2}, {"a": 0.2})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option"),
+    [
+        ("pairs --abilities 0,1", "--sd-rater"),
+        ("thresholds --levels 1,2,3 --threshold 2 --difference 1 --spread 1", "--sd-difference"),
+    ],
+)
+def test_a_plan_for_people_who_are_all_alike_warns(call, monkeypatch, arguments, option) -> None:
+    monkeypatch.setattr(choices, "POOL", 20)
+    code, _, err = call(f"{arguments} --n 8,12 --simulations 10")
+    assert code == 0
+    assert f"warning: {option} is 0" in err
