@@ -164,7 +164,8 @@ def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
         factors.append(table)
     document.add("factors", factors)
     document.add("exemplars", tomlkit.item({"per_cell": len(placed) // len(cells)}))
-    document.add("practice", tomlkit.item({"trials": min(4, len(placed))}))
+    # Practice on most of the clips would show participants the study before it begins.
+    document.add("practice", tomlkit.item({"trials": max(1, min(4, len(placed) // 3))}))
     document.add("trial", tomlkit.item(trial_of(asked, factor_levels)))
     document.add("display", tomlkit.item({"calibrate": "off"}))
     document.add("exclusions", tomlkit.item([{"rule": "incomplete"}, {"rule": "failed_plays"}]))
