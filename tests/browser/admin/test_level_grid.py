@@ -127,3 +127,39 @@ def test_clips_are_put_into_cells_by_keyboard(dashboard: Dashboard) -> None:
     page.get_by_role("button", name="Fill the grid").click()
     _, files = saved(page, dashboard, "keyed", 3)
     assert all(file.startswith(place.split()[0]) for place, file in files.items())
+
+
+def test_clips_that_two_people_move_stay_where_each_put_them(dashboard: Dashboard) -> None:
+    made_study(dashboard, "met")
+    first = factors_page(dashboard, "met")
+    other = first.context.new_page()
+    other.goto(f"{dashboard.server.address}/admin/studies/met/build?section=factors")
+    spot(first, "slow, no. 1: slow_1.mp4").drag_to(spot(first, "slow, no. 2: slow_2.mp4"))
+    spot(other, "fast, no. 1: fast_1.mp4").drag_to(spot(other, "fast, no. 2: fast_2.mp4"))
+    saved(other, dashboard, "met", 2)
+    first.get_by_role("button", name=SAVE).click()
+    expect(first.get_by_text("Clips where version 2 has them: fast_1.mp4; fast_2.mp4")).to_be_visible()
+    _, places = saved(first, dashboard, "met", 3)
+    merged = {
+        "slow 1": "slow_2.mp4",
+        "slow 2": "slow_1.mp4",
+        "fast 1": "fast_2.mp4",
+        "fast 2": "fast_1.mp4",
+    }
+    assert places == merged
+    # Where both move one clip, the saved move stays until the other is chosen.
+    other.reload()
+    spot(first, "slow, no. 1: slow_2.mp4").drag_to(spot(first, "fast, no. 1: fast_2.mp4"))
+    spot(other, "slow, no. 1: slow_2.mp4").drag_to(spot(other, "fast, no. 2: fast_1.mp4"))
+    _, theirs = saved(other, dashboard, "met", 4)
+    first.get_by_role("button", name=SAVE).click()
+    expect(first.get_by_text("You both moved clips: slow_2.mp4")).to_be_visible()
+    expect(first.get_by_text("Saved as version 4.")).to_be_visible()
+    expect(spot(first, "fast, no. 2: slow_2.mp4")).to_be_visible()
+    assert theirs["fast 2"] == "slow_2.mp4"
+    assert axe_violations(first) == []
+    first.get_by_role("group", name="Clips that you both moved").get_by_text("Yours", exact=True).click()
+    expect(spot(first, "fast, no. 1: slow_2.mp4")).to_be_visible()
+    _, places = saved(first, dashboard, "met", 5)
+    assert places == merged | {"slow 1": "fast_2.mp4", "fast 1": "slow_2.mp4"}
+    other.close()
