@@ -132,7 +132,8 @@ def groupings(rows: pd.DataFrame, terms: ModelTerms) -> tuple[Grouping, ...]:
     """
     groups = [_grouping(rows, [terms.participant], terms.participant, "participants")]
     if terms.item:
-        groups.append(_grouping(rows, list(terms.item), "/".join(terms.item), "items"))
+        # Not "/": to R that is a further grouping by the first column.
+        groups.append(_grouping(rows, list(terms.item), ":".join(terms.item), "items"))
     for name in terms.random:
         parts = name.split("/")
         for depth in range(1, len(parts) + 1):

@@ -248,7 +248,7 @@ def _result(
         terms = terms_of(data, group, random_slopes)
         sds = sigma * theta[block.theta] / [data.unit(term) for term in terms]
         components += tuple(Component(group.name, *of) for of in zip(terms, map(float, sds), strict=True))
-    degenerate = degenerate_terms(components, factor, sigma, data)
+    degenerate = degenerate_terms(components, factor, sigma, data, effects)
     components += (Component("residual", "", sigma),)
     return MixedResult(
         formula=formula_of(data, labels, slopes, random_slopes),

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy import optimize
 
@@ -187,18 +188,44 @@ def indistinct_variances_note(known: Uncertainty, names: list[str]) -> tuple[str
 
 
 def degenerate_terms(
-    components: tuple[Component, ...], factor: Floats, sigma: float, data: ModelData
+    components: tuple[Component, ...],
+    factor: Floats,
+    sigma: float,
+    data: ModelData,
+    effects: Sequence["MixedEffect"],
 ) -> tuple[str, ...]:
     """What a singular fit says: which variances are zero, or that random terms depend on one another."""
-    zero = [f"{c.group} {c.term}" for c in components if c.sd * data.unit(c.term) < SINGULAR_THETA * sigma]
-    if zero:
-        return (
-            f"singular fit: the variance of {', '.join(zero)} is estimated as zero; these terms stay at "
-            "zero, which does not affect the tests of other effects",
+    zero = [c for c in components if c.sd * data.unit(c.term) < SINGULAR_THETA * sigma]
+    df = {effect.effect: effect.df_error for effect in effects}
+    said = [
+        f"singular fit: the slope variance of {c.group} {c.term} is estimated as zero, so that the test of "
+        f"{c.term} is against {_error_without(c, components, data)} (df = {df[c.term]:.1f})"
+        for c in zero
+        if c.term in df
+    ]
+    if rest := [f"{c.group} {c.term}" for c in zero if c.term not in df]:
+        said.append(
+            f"singular fit: the variance of {', '.join(rest)} is estimated as zero; these terms stay at "
+            "zero, which does not affect the tests of other effects"
         )
+    if said:
+        return tuple(said)
     if np.linalg.svd(factor, compute_uv=False).min() < SINGULAR_THETA:
         return ("singular fit: the random terms of participants depend on one another (a correlation of 1)",)
     return ()
+
+
+def _error_without(slope: Component, components: tuple[Component, ...], data: ModelData) -> str:
+    """What an effect is tested against where one of its slopes has no variance."""
+    columns = pd.DataFrame(data.slope_columns([slope.term]))
+    for group in data.groups[1:]:
+        own = [c for c in components if c.group == group.name and c.sd > 0]
+        # An intercept counts where levels of the grouping have different values of the effect.
+        means = columns.groupby(group.codes).mean()
+        between = bool((np.ptp(means.to_numpy(), axis=0) > 1e-9).any())
+        if any(c.term == slope.term or (between and c.term == "intercept") for c in own):
+            return "the remaining random terms and the residual"
+    return "the residual"
 
 
 def terms_of(data: ModelData, group: Grouping, slopes: RandomSlopes) -> list[str]:

@@ -31,6 +31,7 @@ from experiments.design import rated_levels
 from experiments.errors import InputError
 from experiments.kinds import scale_called, scales_of
 from experiments.kinds.clip_rating import RATINGS
+from table_files import counted
 
 # Ratings of a study: cell means, their tests, and what is computed in addition.
 
@@ -221,7 +222,7 @@ def contents_of_scales(prepared: PlanRows) -> Contents:
     return Contents(
         name=experiment.name,
         title=experiment.title,
-        lead=f"{people} participants, {len(scales)} scales",
+        lead=f"{counted(people, 'participant')}, {len(scales)} scales",
         source=prepared.source,
         synthetic=prepared.synthetic,
         n_participants=people,
@@ -309,7 +310,7 @@ def multiverse_section(analysis: Analysis, prepared: PlanRows, analyse: Analyse)
     from analysis.plans.sensitivity import MAX_RATINGS
 
     if len(prepared.checked.rows) > MAX_RATINGS:
-        said = f"{len(prepared.checked.rows)} ratings exceed the limit of {MAX_RATINGS}."
+        said = f"{len(prepared.checked.rows):,} ratings exceed the limit of {MAX_RATINGS:,}."
         return Section(MULTIVERSE, f"Not computed: {said}")
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     from analysis.report.figures import multiverse_picture

@@ -14,6 +14,7 @@ from experiments import rules
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import scales_of
 from experiments.rules.exclusions import LeavesOutRuns, LeavesOutTrials, RunTrials, ScreensRaters, Source
+from table_files import counted
 
 
 @dataclass(frozen=True)
@@ -129,14 +130,16 @@ def judge_rows(experiment: Experiment, ratings: StudyAnswers) -> RuleVerdicts:
     # Whatever is none of the three counts as practice.
     practice = n_plays(rows[~kind.isin(["main", "attention", "check"]).to_numpy()])
     checks = n_plays(rows[(kind == "check").to_numpy()])
-    aside += [f"{practice} practice trials"] if practice else []
-    aside += [f"{checks} motion checks"] if checks else []
+    aside += [counted(practice, "practice trial")] if practice else []
+    aside += [counted(checks, "motion check")] if checks else []
     unrated = np.isnan(main["response"].to_numpy())
     # An answer, not a missing one, and named apart.
     not_applicable = unrated & _not_applicable(main)
     silent = n_plays(main[unrated & ~not_applicable])
-    aside += [f"{silent} presentations without a rating"] if silent else []
-    aside += [f"{not_applicable.sum()} answers of 'does not apply'"] if not_applicable.any() else []
+    aside += [counted(silent, "presentation") + " without a rating"] if silent else []
+    aside += [counted(int(not_applicable.sum()), "answer") + " of 'does not apply'"] * bool(
+        not_applicable.any()
+    )
     # Some rules count plays without an answer, so these are kept for them.
     plays, main = main, main[~unrated]
     sources: dict[Source, pd.DataFrame] = {"rows": rows, "plays": plays, "attention": attention}

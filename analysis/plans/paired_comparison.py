@@ -26,6 +26,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.declaration.paired_comparison import CODES, paired_comparison_of
 from experiments.errors import InputError
 from experiments.kinds.paired_comparison import COMPARISONS
+from table_files import counted
 
 # The comparisons of a study: its cells as items, and their levels in the compared factors.
 
@@ -182,7 +183,10 @@ def contents_of_groups(prepared: PlanRows, analyse: Callable[[PlanRows], Content
     return replace(
         first,
         title=experiment.title,
-        lead=f"{people} participants in {len(made)} groups, {len(prepared.rows)} comparisons",
+        lead=(
+            f"{counted(people, 'participant')} in {counted(len(made), 'group')}, "
+            f"{counted(len(prepared.rows), 'comparison')}"
+        ),
         n_participants=people,
         left_out=left_out(prepared.exclusions),
         # Each decision once: decisions about the whole table come from every group.

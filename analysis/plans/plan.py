@@ -104,7 +104,7 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
     InputError
         An answer that the declaration does not allow, a trial stored twice with different data.
     """
-    chosen, pooling = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
+    chosen, pooling, aside = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
     rows, repeats = _without_repeats(chosen, plan.keys, answers.source)
     rows = plan.numbered(rows)
     main = _main(rows)
@@ -116,6 +116,7 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
     checked = replace(answers, rows=rows)
     exclusions = apply_exclusions(experiment, checked)
     _refuse_nobody(exclusions, answers, chosen, pool)
+    exclusions = replace(exclusions, set_aside=(*aside, *exclusions.set_aside))
     decisions = (*answers.decisions, *pooling, *repeats)
     return PlanRows(experiment, answers.source, checked.synthetic, exclusions, decisions, checked)
 
@@ -199,7 +200,7 @@ def study_contents(
         scale_called(experiment, scale)
     answers = with_verdicts(answers, runs) if runs else answers
     contents = plan.analyse(replace(prepare(experiment, plan, answers, pool), scale=scale))
-    chosen, _ = pooled(answers.rows, pool, answers.source, definition_sha256(experiment))
+    chosen = pooled(answers.rows, pool, answers.source, definition_sha256(experiment)).rows
     evidence, numbers = evidence_section(chosen, runs, contents.synthetic)
     if evidence is None:
         return contents

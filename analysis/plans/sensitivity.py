@@ -3,6 +3,7 @@ models."""
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
@@ -10,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 from analysis.plans.result import Analysis, Labels
 from analysis.report.contents import Section, caption
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, fixed, p_value
+from analysis.report.numbers import DASH, apa_p, fixed, p_value
 from analysis.report.r_models import model_files
-from analysis.within.simple_effects import first_p
+from analysis.within.simple_effects import SIGNIFICANCE, first_p
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,7 +27,11 @@ if TYPE_CHECKING:
 _MOVED = re.compile(
     r"(?P<names>.+)(?P<said>: one level per participant, treated as a factor between participants)"
 )
-_SLOPES = ("slope", "slopes")
+_SLOPES = ("slope", "slopes", "test")
+SLOPES = (
+    "Slopes: orthogonal contrasts of unit variance; the contrasts of one effect share one variance, "
+    "uncorrelated."
+)
 
 
 def notes_of(result: "MixedResult | OrdinalResult", labels: Labels) -> tuple[str, ...]:
@@ -37,7 +42,12 @@ def notes_of(result: "MixedResult | OrdinalResult", labels: Labels) -> tuple[str
         by_group.setdefault(group, []).append(f"{labels.term(one.term)} {fixed(one.sd, 3)}".strip())
     said = "; ".join(f"{group} {', '.join(terms)}" for group, terms in by_group.items())
     sds = (f"Standard deviations: {said}.",) if said else ()
-    return (*sds, *(_in_labels(note, result, labels) for note in result.notes))
+    slopes = any(one.term not in ("", "intercept") for one in result.components)
+    return (
+        *sds,
+        *((SLOPES,) if slopes and result.slopes != "correlated" else ()),
+        *(_in_labels(note, result, labels) for note in result.notes),
+    )
 
 
 def _in_labels(note: str, result: "MixedResult | OrdinalResult", labels: Labels) -> str:
@@ -195,9 +205,8 @@ def _no_models(analysis: Analysis) -> str | None:
     if "exemplar" not in rows.columns or rows["exemplar"].isna().any():
         return "the data do not say which exemplar was rated"
     if len(rows) > MAX_RATINGS:
-        return (
-            f"{len(rows)} ratings exceed the limit of {MAX_RATINGS}; use analysis mixed and analysis ordinal"
-        )
+        limit = f"{len(rows):,} ratings exceed the limit of {MAX_RATINGS:,}"
+        return f"{limit}; use analysis mixed and analysis ordinal"
     return None
 
 
@@ -256,7 +265,7 @@ def mixed_model(analysis: Analysis) -> Section:
     slopes = "every effect" if every else "the main effects"
     text = (
         f"Participants crossed with blinks, by-participant slopes for {slopes}, REML, type III tests with "
-        f"Satterthwaite's df; {result.n_ratings} ratings of {result.n_items} blinks by "
+        f"Satterthwaite's df; {result.n_ratings:,} ratings of {result.n_items} blinks by "
         f"{result.n_participants} participants. Unlike the ANOVA, it treats the blinks shown as a sample."
     )
     if random:
@@ -266,12 +275,30 @@ def mixed_model(analysis: Analysis) -> Section:
             f" With more than {MAX_CELLS} cells, slopes for every effect take minutes (analysis mixed fits "
             "them). Without them, the p of interactions is too small if people differ in them."
         )
+    section = Section("Linear mixed model", text, (table,), sentences=_disagreements(analysis, result))
     # The R script has no counterpart of slopes for random factors, so none is written.
     if random:
-        return Section("Linear mixed model", text, (table,))
-    return Section(
-        "Linear mixed model", text, (table,), (), partial(model_files, analysis, arguments, result)
-    )
+        return section
+    return replace(section, beside=partial(model_files, analysis, arguments, result))
+
+
+def _disagreements(analysis: Analysis, result: "MixedResult") -> tuple[str, ...]:
+    """Effects that are significant in the ANOVA or in the mixed model, not in both: one sentence."""
+    said = []
+    for effect in result.effects:
+        ours = analysis.anova.effect(effect.effect)
+        anova_p = first_p(ours, analysis.multivariate_first)
+        significant = effect.p_value < SIGNIFICANCE
+        if not isfinite(anova_p) or significant == (anova_p < SIGNIFICANCE):
+            continue
+        said.append(
+            f"{analysis.labels.effect(ours.factors)} was {'' if significant else 'not '}significant, "
+            f"F({effect.df_effect}, {fixed(effect.df_error)}) = {fixed(effect.f_value)}, "
+            f"{apa_p(effect.p_value)}"
+        )
+    if not said:
+        return ()
+    return (f"The linear mixed model with blinks as random disagrees with the ANOVA: {'; '.join(said)}.",)
 
 
 def ordinal_model(analysis: Analysis) -> Section:
@@ -328,14 +355,12 @@ def ordinal_model(analysis: Analysis) -> Section:
 
 
 def bayes_factors(analysis: Analysis) -> Section:
-    """JZS Bayes factors of the planned pairs (all one-factor pairs where none are planned).
+    """JZS Bayes factors of every pair of one factor.
 
     Source: Rouder et al. (2009), doi:10.3758/PBR.16.2.225.
     """
-    planned = analysis.experiment.analysis.pairs if analysis.experiment else ()
-    names = [name for name in planned or analysis.anova.all_factors if name in analysis.anova.all_factors]
     rows = []
-    for pair in (p for p in analysis.pairs if p.effect in names):
+    for pair in (p for p in analysis.pairs if p.effect in analysis.anova.all_factors):
         bf = pair.bayes_factor
         name = analysis.labels.pair(pair.cell_a, pair.cell_b)
         # A factor that underflows to 0 has an infinite reciprocal.
@@ -347,7 +372,7 @@ def bayes_factors(analysis: Analysis) -> Section:
     )
     text = (
         "BF₁₀ compares a difference with no difference; BF₀₁ is the reverse. JZS prior, Cauchy scale r = "
-        "√2/2. Values between 1/3 and 3 are inconclusive."
+        "√2/2. Values between 1/3 and 3 are weak (inconclusive) evidence."
     )
     return Section("Bayes factors", text, (table,))
 

@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from experiments.errors import InputError
+from table_files import counted
 
 VERSION, SERIES = "study_version", "data_series"
 """The columns with the version of the study under which an answer was given, and that version's series."""
@@ -42,9 +44,15 @@ class Pool:
         return origin + series + (f" under version {self.version}" if self.version else "")
 
 
-def pooled(
-    rows: pd.DataFrame, pool: Pool, source: str, declaration_sha256: str
-) -> tuple[pd.DataFrame, tuple[str, ...]]:
+class PooledRows(NamedTuple):
+    """The rows of a pool, in words which they are, and the rows of other origins."""
+
+    rows: pd.DataFrame
+    decisions: tuple[str, ...]
+    set_aside: tuple[str, ...]
+
+
+def pooled(rows: pd.DataFrame, pool: Pool, source: str, declaration_sha256: str) -> PooledRows:
     """The rows of this pool, and in words which they are and what was left aside.
 
     Without a wish the origin is the first of participant, pilot and simulated that there is (in the version
@@ -58,13 +66,15 @@ def pooled(
         A series or version that the rows do not have.
     """
     said: list[str] = []
+    aside: list[str] = []
     # What was asked for first: the default origin is that of the rows which remain.
     rows = _of_number(rows, VERSION, pool.version, source, said)
     rows = _of_number(rows, SERIES, pool.series, source, said)
-    rows = _of_origin(rows, pool.origin, said)
+    rows = _of_origin(rows, pool.origin, said, aside)
     # The series last: the latest one depends on the version and on the origin.
     rows = _of_number(rows, SERIES, _series_of(rows, declaration_sha256), source, said)
-    return rows, (*_named(rows, pool), *said, *_declarations(rows, declaration_sha256))
+    decisions = (*_named(rows, pool), *said, *_declarations(rows, declaration_sha256))
+    return PooledRows(rows, decisions, tuple(aside))
 
 
 def _named(rows: pd.DataFrame, pool: Pool) -> Iterator[str]:
@@ -115,7 +125,7 @@ def origins(rows: pd.DataFrame) -> np.ndarray:
     return origin
 
 
-def _of_origin(rows: pd.DataFrame, chosen: Origin | None, said: list[str]) -> pd.DataFrame:
+def _of_origin(rows: pd.DataFrame, chosen: Origin | None, said: list[str], aside: list[str]) -> pd.DataFrame:
     origin_of_row = origins(rows)
     there = [origin for origin in Origin if (origin_of_row == origin.value).any()]
     if chosen is Origin.ALL:
@@ -126,7 +136,8 @@ def _of_origin(rows: pd.DataFrame, chosen: Origin | None, said: list[str]) -> pd
     origin = chosen or (there[0] if there else Origin.PARTICIPANT)
     mine = origin_of_row == origin.value
     if not mine.all():
-        said.append(f"origin {origin}: {(~mine).sum()} rows of other origins were ignored")
+        said.append(f"only responses of origin {origin} were analyzed")
+        aside.append(f"{counted(int((~mine).sum()), 'row')} of other origins")
     return rows if mine.all() else rows[mine]
 
 
@@ -146,7 +157,8 @@ def _of_number(
         return rows
     # As text, since a column with empty cells holds no whole numbers.
     mine = (rows[column].astype(str) == str(chosen)).to_numpy()
-    said.append(f"{what} {chosen}: {(~mine).sum()} other rows were ignored")
+    number = int((~mine).sum())
+    said.append(f"{what} {chosen}: {counted(number, 'other row')} {'was' if number == 1 else 'were'} ignored")
     return rows[mine]
 
 

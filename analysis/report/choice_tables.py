@@ -279,13 +279,26 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
         for condition, fit in result.pooled.items()
     )
     header = ("Condition", "Threshold", "95% CI", "Spread", "x .75", "Lapse", "fit p", "Trials")
+    first = next(iter(result.pooled.values()))
     notes = (
-        ("All trials pooled: if people differ, the slope is flatter and the interval is too narrow.",)
-        if result.means
-        else ()
+        f"Spread: {SPREADS[first.shape]}. x .75: where the whole function is .75. Lapse: "
+        f"{'fitted' if first.lapse_fitted else 'assumed'} share of responses independent of the stimulus. "
+        "fit p: test of the function against the proportions at every stimulus.",
+        *(
+            ("All trials pooled: if people differ, the slope is flatter and the interval is too narrow.",)
+            if result.means
+            else ()
+        ),
     )
     title = caption("Thresholds over all trials", name, synthetic)
     return Table("thresholds", title, header, rows, 1, notes)
+
+
+SPREADS: dict[str, str] = {
+    "normal": "SD of the normal function",
+    "logistic": "scale of the logistic function",
+    "weibull": "exponent of the Weibull function",
+}
 
 
 def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) -> Table:

@@ -40,13 +40,14 @@ def _no_files(_: str) -> dict[str, bytes]:
 
 @dataclass(frozen=True)
 class Section:
-    """A further piece of the report: sensitivity analyses, checks."""
+    """A further piece of the report: sensitivity analyses, checks; `sentences` join those of its part."""
 
     title: str
     text: str
     tables: tuple[Table, ...] = ()
     pictures: tuple[Picture, ...] = ()
     beside: Callable[[str], dict[str, bytes]] = _no_files
+    sentences: tuple[str, ...] = ()
 
 
 def _no_pictures() -> tuple[Picture, ...]:

@@ -426,9 +426,13 @@ def traces_figure(
     for panel in panels[max(0, len(traces) - columns) : len(traces)]:
         panel.set_xlabel("Time in the clip in s" + (", less the lag" if earlier_s else ""))
         panel.tick_params(labelbottom=True)
-    note = f"Mean over people with 95% intervals, drawn {fixed(earlier_s)} s earlier than recorded. "
-    write_note(figure, note + "Marks: blinks, one row per clip.", synthetic, "answers")
-    alt = f"Mean rating over time in {len(traces)} cells, with blinks marked"
+    marked = any(events for trace in traces for events in trace.events_s)
+    note = "Mean over people" if any(trace.people > 1 for trace in traces) else "Mean of one person's clips"
+    note += " with 95% intervals" if any(np.isfinite(trace.ci_low).any() for trace in traces) else ""
+    note += f", drawn {fixed(earlier_s)} s earlier than recorded." if earlier_s else "."
+    note += " Marks: blinks, one row per clip." if marked else ""
+    write_note(figure, note, synthetic, "answers")
+    alt = f"Mean rating over time in {len(traces)} cells{', with blinks marked' if marked else ''}"
     return _trace_picture(figure, "figure-traces", "Mean traces", alt)
 
 

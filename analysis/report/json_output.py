@@ -7,6 +7,7 @@ from analysis.plans.result import Analysis
 from analysis.within.effects import Effect
 from analysis.within.homogeneity import box_test, levene_tests
 from analysis.within.multivariate_tests import MultivariateTest
+from table_files import counted
 
 if TYPE_CHECKING:
     from analysis.plans.exclusions import Exclusions
@@ -165,17 +166,24 @@ def exclusions_data(exclusions: "Exclusions") -> dict[str, Any]:
 
 
 def left_out(exclusions: "Exclusions") -> tuple[str, ...]:
-    """Exclusions and decisions with their reasons, one line each; a single line if there are none."""
+    """Exclusions with their reasons, one line each; a single line if there are none."""
     lines = [
         f"participant {run.participant}{f' (run {run.run})' if run.run != run.participant else ''} excluded: "
         f"{'; '.join(run.reasons)}"
         for run in exclusions.runs
     ]
     lines += [
-        f"{d.trials} trials of {d.participants} participants excluded: {d.rule}" for d in exclusions.trials
+        f"{counted(d.trials, 'trial')} of {counted(d.participants, 'participant')} excluded: {d.rule}"
+        for d in exclusions.trials
     ]
-    lines += [f"set aside: {aside}" for aside in exclusions.set_aside]
+    if not lines:
+        lines = [f"No analyzed trial was excluded (of {counted(exclusions.n_runs, 'participant')})"]
+        if exclusions.set_aside:
+            *others, last = exclusions.set_aside
+            named = f"{', '.join(others)} and {last}" if others else last
+            one = not others and last.startswith("1 ")
+            lines = [f"{lines[0]}; {named} {'was' if one else 'were'} set aside"]
+    else:
+        lines += [f"set aside: {aside}" for aside in exclusions.set_aside]
     lines += [f"rule not applied: {reason}" for reason in exclusions.not_applied]
-    if not exclusions.runs and not exclusions.trials:
-        lines.insert(0, f"no participant or trial was excluded (of {exclusions.n_runs} participants)")
     return tuple(lines)

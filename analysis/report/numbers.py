@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Iterable, Sequence
+from decimal import ROUND_HALF_UP, Decimal
 
 DASH = "–"
 """Printed where a number does not exist."""
@@ -16,6 +17,10 @@ def fixed(value: float, digits: int = 2) -> str:
     if not math.isfinite(value):
         return DASH
     text = f"{value:.{digits}f}"
+    # Half away from zero on the decimal number: 71.755 may be stored as 71.75499999999998. Larger numbers
+    # have no digits to spare.
+    if abs(value) < 1e6:
+        text = f"{Decimal(f'{value:.14g}').quantize(Decimal(1).scaleb(-digits), ROUND_HALF_UP):f}"
     # A small negative number may round to -0.00.
     return text.lstrip("-") if float(text) == 0 else text
 

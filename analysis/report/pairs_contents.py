@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from analysis.pairs.abilities import FactorTest, ItemFactors, PairsResult
-from analysis.pairs.comparisons import Comparisons
+from analysis.pairs.comparisons import Comparisons, separated_items
 from analysis.pairs.findings import Findings
 from analysis.plans.plan import PlanRows
 from analysis.plans.result import Labels, labels_of
@@ -17,23 +17,29 @@ from analysis.report.json_output import exclusions_data, left_out, study_data
 from analysis.report.numbers import apa_p, fixed, p_value
 from analysis.report.r_models import pairs_files
 from experiments.declaration.experiment import Experiment
+from table_files import counted
 
 # Sentences about paired comparisons in APA style.
 
 SIGNIFICANCE = 0.05
 LACK_OF_FIT = "lack of fit"
+NO_MAXIMUM = "could not be fitted by maximum likelihood"
 
 
 def sentences(findings: Findings, items: Sequence[str]) -> tuple[str, ...]:
     """Whether items differ and in which order, what each factor does, and how well the model holds."""
     result = findings.abilities
     if result is None:
-        return (f"The abilities of the {len(items)} cells were not fitted: {findings.abilities_reason}.",)
+        reason = findings.abilities_reason or ""
+        if NO_MAXIMUM in reason:
+            return (f"{reason}.",)
+        return (f"The abilities of the {len(items)} cells were not fitted: {reason}.",)
     said = [_equality(findings, result), _ranking(result)]
     if findings.factors is not None:
         said += [_factor(test) for test in findings.factors.factors if test.df > 0]
     elif findings.factors_reason:
-        said.append(f"Effects of factors were not fitted: {findings.factors_reason}.")
+        reason = findings.factors_reason
+        said.append(f"{'' if NO_MAXIMUM in reason else 'Effects of factors were not fitted: '}{reason}.")
     return (*said, *_checks(findings, result))
 
 
@@ -108,14 +114,45 @@ METHODS = {
         "two abilities are, the more likely is a tie. "
     ),
 }
-FURTHER = (
-    "Maximum likelihood; robust SE treat each rater's comparisons as one cluster (Liang and Zeger 1986). "
+COUNTS = "Choices are counted in each pair, sides taken together."
+ESTIMATED = {False: "Maximum likelihood. ", True: "Maximum likelihood with Firth's penalty. "}
+ROBUST = "Robust SE treat each rater's comparisons as one cluster (Liang & Zeger, 1986). "
+FACTORS = (
     "Each factor is tested by the likelihood ratio with and without it, keeping all other factors; levels "
-    "are compared with the first declared one. The lack-of-fit test compares free abilities with the sum of "
-    "the factors' effects. Differences between items are Holm-corrected. The advantage of the left (first) "
-    "side is a separate parameter, fitted together with free abilities. Transitivity is counted over "
-    "triples of items; a tie counts as half a choice for each."
+    "are compared with the first declared one. "
 )
+LACK = "The lack-of-fit test compares free abilities with the sum of the factors' effects. "
+CONTRASTS = "Differences between items are Holm-corrected. "
+SIDE = "The advantage of the left (first) side is a separate parameter, fitted together with free abilities. "
+TRIPLES = "Transitivity is counted over triples of items; a tie counts as half a choice for each. "
+
+
+def methods_of(findings: Findings) -> str:
+    """How the numbers came about, of what was computed."""
+    result = findings.abilities
+    if result is None:
+        return COUNTS
+    tests = () if findings.factors is None else findings.factors.factors
+    said = METHODS[result.method] + ESTIMATED[result.firth]
+    said += ROBUST if any(item.se_robust is not None for item in result.items) else ""
+    said += FACTORS if any(test.factor != LACK_OF_FIT for test in tests) else ""
+    said += LACK if any(test.factor == LACK_OF_FIT and test.df > 0 for test in tests) else ""
+    said += CONTRASTS if result.contrasts else ""
+    said += SIDE if findings.order is not None else ""
+    return (said + (TRIPLES if result.transitivity.triples else "")).strip()
+
+
+def _reason(reason: str | None, comparisons: Comparisons, items: Mapping[str, str]) -> str | None:
+    """Why a model was not fitted, in labels and without the options of a command."""
+    if reason is None:
+        return None
+    named = replace(comparisons, items=tuple(items[item] for item in comparisons.items))
+    separated = separated_items(named)
+    # Only these reasons name the option, so the cause is the separation.
+    if separated is not None and "--firth" in reason:
+        model = "Davidson" if comparisons.ties else "Bradley-Terry"
+        return f"The {model} model {NO_MAXIMUM}, because {separated}"
+    return reason.removeprefix(f"{comparisons.source}: ").partition("; use --")[0].partition("; add --")[0]
 
 
 def item_labels(experiment: Experiment, items: tuple[str, ...]) -> dict[str, str]:
@@ -139,14 +176,18 @@ def contents_of(
     """What the report says."""
     experiment, items = prepared.experiment, item_labels(prepared.experiment, comparisons.items)
     shown = labelled_findings(findings, items, labels_of(experiment))
+    shown = replace(
+        shown,
+        abilities_reason=_reason(findings.abilities_reason, comparisons, items),
+        factors_reason=_reason(findings.factors_reason, comparisons, items),
+    )
     name, synthetic = experiment.name, prepared.synthetic
     people, number = len(comparisons.participants), comparisons.outcome.size
     said = sentences(shown, [items[item] for item in comparisons.items])
-    method = "" if findings.abilities is None else METHODS[findings.abilities.method]
     return Contents(
         name=name,
         title=experiment.title,
-        lead=f"{people} participants, {number} comparisons of {len(items)} cells",
+        lead=f"{counted(people, 'participant')}, {counted(number, 'comparison')} of {len(items)} cells",
         source=prepared.source,
         synthetic=synthetic,
         n_participants=people,
@@ -161,7 +202,7 @@ def contents_of(
                 brief=said[:2],
             ),
         ),
-        methods=method + FURTHER,
+        methods=methods_of(findings),
         numbers=numbers(prepared, comparisons, findings),
         given="comparisons",
     )

@@ -12,9 +12,10 @@ from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, left_out, study_data
 from analysis.report.numbers import fixed
-from analysis.report.threshold_contents import difference_sentence, differences_table
+from analysis.report.threshold_contents import ADAPTIVE, compared_by, difference_sentence, differences_table
 from analysis.thresholds.plane_people import PlanesResult
 from experiments.declaration.threshold import threshold_of
+from table_files import counted
 
 if TYPE_CHECKING:
     from analysis.thresholds.plane_people import SeriesPlane
@@ -25,12 +26,13 @@ METHODS = (
     "x the {first}, z the {second}, with the declared guess rate {guess:g} and lapse rate {lapse:g}, by "
     "maximum likelihood: the threshold t at the middle z0 moves by the tilt b along z. Intervals are 95% "
     "profiles of the likelihood. 'fit p' tests the line and the shape against the proportions at every "
-    "stimulus. Over people, thresholds and tilts are normal random variables. They are fitted to all "
-    "responses by marginal maximum likelihood (profiles with the quantile of F(1, people - 1)). Means of "
-    "individual fits are random-effects means (REML, Hartung-Knapp intervals). Series are compared within "
-    "people by paired t tests and between groups by Welch's t tests, Holm-corrected. Stimuli depended on "
-    "earlier responses; the likelihood is the same as for fixed stimuli. "
+    "stimulus. {rest}"
 )
+POPULATION = (
+    "Over people, thresholds and tilts are normal random variables. They are fitted to all "
+    "responses by marginal maximum likelihood (profiles with the quantile of F(1, people - 1)). "
+)
+AVERAGES = "Means of individual fits are random-effects means (REML, Hartung-Knapp intervals). "
 
 
 def contents_of(
@@ -51,8 +53,8 @@ def contents_of(
         name=experiment.name,
         title=experiment.title,
         lead=(
-            f"{people} participants, {len(prepared.rows)} trials in {len(fits)} series of "
-            f"{' and '.join(variables)}"
+            f"{counted(people, 'participant')}, {counted(len(prepared.rows), 'trial')} in {len(fits)} series "
+            f"of {' and '.join(variables)}"
         ),
         source=prepared.source,
         synthetic=prepared.synthetic,
@@ -70,7 +72,14 @@ def contents_of(
             ),
         ),
         methods=METHODS.format(
-            first=variables[0], second=variables[1], guess=trial.task.guess, lapse=trial.lapse
+            first=variables[0],
+            second=variables[1],
+            guess=trial.task.guess,
+            lapse=trial.lapse,
+            rest=(POPULATION if merged and merged.population else "")
+            + (AVERAGES if merged and merged.means else "")
+            + compared_by(differences)
+            + ADAPTIVE,
         ),
         numbers=numbers(prepared, fits, differences, people),
     )

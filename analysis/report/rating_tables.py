@@ -316,10 +316,10 @@ def _interval_between(low: float, high: float) -> str:
 
 TEXT = (
     "The same effects, tested with fewer assumptions. Permutation: the univariate F is compared with those "
-    "of rearranged residuals (Freedman and Lane). Participants stay whole; within participants, signs are "
-    "flipped. Ranks: ANOVA of aligned ranks (Wobbrock and others), p with the Greenhouse-Geisser "
+    "of rearranged residuals (Freedman & Lane, 1983). Participants stay whole; within participants, signs "
+    "are flipped. Ranks: ANOVA of aligned ranks (Wobbrock et al., 2011), p with the Greenhouse-Geisser "
     "correction. Trimmed: pairs of levels compared by means without the outer fifth of participants on each "
-    "side (Yuen), Holm-corrected within a margin. If these disagree with the ANOVA, look at individual "
+    "side (Yuen, 1974), Holm-corrected within a margin. If these disagree with the ANOVA, look at individual "
     "participants in the figures."
 )
 
@@ -386,7 +386,8 @@ def _rank_cells(test: RankTest | None) -> tuple[str, str, str]:
 def _rearranged(tests: tuple[PermutationTest, ...]) -> str:
     kinds = {(test.flips, test.exact, test.n_rearranged) for test in tests if test.n_rearranged}
     said = [
-        f"{'all' if exact else 'random'} {number:,} {'sign flips' if flips else 'orders of people'}"
+        f"{'all ' if exact else ''}{number:,}{'' if exact else ' random'} "
+        f"{'sign flips' if flips else 'orders of people'}"
         for flips, exact, number in sorted(kinds)
     ]
     return f"Permutation: {' and '.join(said)}." if said else "Not tested: nothing varies."

@@ -1,5 +1,6 @@
 """The report of a study of thresholds: tables, sentences and the psychometric functions."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
@@ -8,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.plans.plan import PlanRows
-from analysis.report.choice_tables import means_table, people_table, threshold_decimals, threshold_table
+from analysis.report.choice_tables import (
+    interval_text,
+    means_table,
+    people_table,
+    threshold_decimals,
+    threshold_table,
+)
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, left_out, study_data
@@ -19,6 +26,7 @@ from analysis.thresholds.people import ThresholdsResult
 from analysis.thresholds.psychometric import Threshold
 from analysis.thresholds.series import answers_of
 from experiments.declaration.threshold import threshold_of
+from table_files import counted
 
 if TYPE_CHECKING:
     from analysis.thresholds.series import Difference, SeriesFit
@@ -26,16 +34,27 @@ if TYPE_CHECKING:
 METHODS = (
     "P(x) = guess + (1 - guess - lapse) F(x), F {function}, with the declared guess rate {guess:g} and "
     "lapse rate {lapse:g}, by maximum likelihood; the threshold is where F is one half. Intervals are 95% "
-    "profiles of the likelihood. The first table averages the individual thresholds (random effects by "
-    "REML, Hartung-Knapp interval). The table over all trials pools them, which flattens the slope if "
-    "people differ. Series are compared within people by paired t tests and between groups by Welch's t "
-    "tests, Holm-corrected. Stimuli depended on earlier responses; the likelihood is the same as for fixed "
-    "stimuli. {weibull}"
+    "profiles of the likelihood. {rest}"
 )
+AVERAGES = (
+    "The first table averages the individual thresholds (random effects by REML, Hartung-Knapp interval). "
+)
+POOLED = "The table over all trials pools them, which flattens the slope if people differ. "
+ADAPTIVE = "Stimuli depended on earlier responses; the likelihood is the same as for fixed stimuli. "
 SIGNIFICANCE = 0.05
+CRITERION = "where the function without guesses and lapses is one half"
 WEIBULL = (
     "The declared Weibull function has its threshold where F = 1 - 1/e; here the threshold is where F = 1/2. "
 )
+
+
+def compared_by(differences: "Sequence[Difference]") -> str:
+    """How series were compared; nothing where none were."""
+    # Only Welch's df are not whole.
+    paired = [float(one.df).is_integer() for one in differences]
+    tests = ["within people by paired t tests"] * any(paired)
+    tests += ["between groups by Welch's t tests"] * (not all(paired))
+    return f"Series are compared {' and '.join(tests)}, Holm-corrected. " if tests else ""
 
 
 def contents_of(
@@ -51,7 +70,7 @@ def contents_of(
     return Contents(
         name=name,
         title=experiment.title,
-        lead=f"{people} participants, {number} trials in {len(fits)} series of {axis}",
+        lead=f"{counted(people, 'participant')}, {counted(number, 'trial')} in {len(fits)} series of {axis}",
         source=prepared.source,
         synthetic=synthetic,
         n_participants=people,
@@ -60,19 +79,23 @@ def contents_of(
         parts=(
             Part(
                 _tables(fits, merged, differences, name, synthetic),
-                sentences(fits, merged, differences),
+                sentences(fits, merged, differences, axis),
                 # A function, so that a report without figures never loads matplotlib.
                 draw=lambda: (draw(fits, axis, synthetic, people),),
                 beside=lambda key: _r_files(prepared, fits, differences, key),
                 # Without the series that could not be fitted: those are in the full report.
-                brief=sentences((), merged, differences),
+                brief=sentences((), merged, differences, axis),
             ),
         ),
         methods=METHODS.format(
             function=trial.function,
             guess=trial.task.guess,
             lapse=trial.lapse,
-            weibull=WEIBULL if trial.function == "weibull" else "",
+            rest=(AVERAGES if merged.means else "")
+            + (POOLED if people > 1 else "")
+            + compared_by(differences)
+            + ADAPTIVE
+            + (WEIBULL if trial.function == "weibull" else ""),
         ),
         numbers=numbers(prepared, fits, merged, differences, people),
     )
@@ -156,9 +179,15 @@ def shares_table(fits: "Sequence[SeriesFit]", name: str, synthetic: bool) -> Tab
 
 
 def sentences(
-    fits: "Sequence[SeriesFit]", merged: ThresholdsResult, differences: "Sequence[Difference]"
+    fits: "Sequence[SeriesFit]", merged: ThresholdsResult, differences: "Sequence[Difference]", along: str
 ) -> tuple[str, ...]:
-    """The threshold of each series, over people where there are several, and the differences."""
+    """The threshold of each series, over people where there are several, and the differences.
+
+    `along` is the label of the stimulus with its unit.
+    """
+    # A label names its unit last; without one it is printed whole.
+    named = re.search(r" in (\S{1,6})$| \((\S{1,6})\)$", along)
+    unit = f" {named[1] or named[2]}" if named else f" ({along})"
     said = [f"{fit.label}: no function was fitted: {fit.reason}." for fit in fits if fit.reason]
     means, digits = {mean.condition: mean for mean in merged.means}, threshold_decimals(merged)
     for label, fit in merged.pooled.items():
@@ -167,11 +196,14 @@ def sentences(
             mean = means[label]
             low, high = fixed(mean.ci_low, digits), fixed(mean.ci_high, digits)
             said.append(
-                f"{label}: the mean threshold of {mean.people} people was {fixed(mean.mean, digits)}, 95% CI "
-                f"[{low}, {high}]."
+                f"{label}: the mean threshold of {mean.people} people ({CRITERION}) was "
+                f"{fixed(mean.mean, digits)}{unit}, 95% CI [{low}, {high}]."
             )
         else:
-            said.append(f"{label}: the threshold over all trials was {fixed(fit.threshold, digits)}.")
+            said.append(
+                f"{label}: the threshold over all trials ({CRITERION}) was "
+                f"{fixed(fit.threshold, digits)}{unit}, 95% CI {interval_text(fit.threshold_ci, digits)}."
+            )
         said += [f"{label}: {note}." for note in fit.notes]
     return (*said, *(difference_sentence(one) for one in differences))
 

@@ -10,15 +10,20 @@ from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, left_out
 from analysis.report.numbers import apa_p, fixed, interval, p_value
 from analysis.traces import LagResult, MeanTrace
+from table_files import counted
 
 METHODS = (
     "Ratings were sampled at the clips' frames. Traces were averaged over the clips of a cell within each "
-    "person, and then over people. Intervals are 95% t intervals over people at each sample. The lag is "
-    "where the change in ratings correlates most with blink onsets. It is found by circular "
+    "person, and then over people. "
+)
+INTERVALS = "Intervals are 95% t intervals over people at each sample. "
+LAG = (
+    "The lag is where the change in ratings correlates most with blink onsets. It is found by circular "
     "cross-correlation up to the declared longest lag, averaged over clips and then over people. Its "
     "interval is a bootstrap over people. The p value compares the greatest correlation with those of 999 "
-    "random circular shifts of each clip's blinks. The figure draws the traces earlier by this lag."
+    "random circular shifts of each clip's blinks. "
 )
+EARLIER = "The figure draws the traces earlier by this lag. "
 SIGNIFICANCE = 0.05
 
 
@@ -31,7 +36,10 @@ def contents_of(
     return Contents(
         name=experiment.name,
         title=experiment.title,
-        lead=f"{people} participants, {len(prepared.rows)} traces of {clips} clips",
+        lead=(
+            f"{counted(people, 'participant')}, {counted(len(prepared.rows), 'trace')} of "
+            f"{counted(clips, 'clip')}"
+        ),
         source=prepared.source,
         synthetic=synthetic,
         n_participants=people,
@@ -40,11 +48,11 @@ def contents_of(
         parts=(
             Part(
                 tables(prepared, traces, lag),
-                sentences(lag),
+                sentences(lag, traces),
                 draw=lambda: tuple(pictures(prepared, traces, lag)),
             ),
         ),
-        methods=METHODS,
+        methods=methods_of(traces, lag),
         numbers=numbers(prepared, traces, lag, people),
     )
 
@@ -84,10 +92,19 @@ def tables(prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | Non
     return tuple(made)
 
 
-def sentences(lag: LagResult | None) -> tuple[str, ...]:
+def methods_of(traces: Sequence[MeanTrace], lag: LagResult | None) -> str:
+    """How the numbers came about, of what was computed."""
+    said = METHODS + (INTERVALS if any(trace.people > 1 for trace in traces) else "")
+    said += "" if lag is None else LAG
+    return (said + (EARLIER if lag is not None and lag.p < SIGNIFICANCE else "")).strip()
+
+
+def sentences(lag: LagResult | None, traces: Sequence[MeanTrace]) -> tuple[str, ...]:
     """Whether ratings answer blinks, and after how long."""
     if lag is None:
-        return ("The lag cannot be estimated: the clips have no blinks, or only one person rated them.",)
+        blinks = any(events for trace in traces for events in trace.events_s)
+        why = "fewer than two people rated clips with blinks" if blinks else "the clips have no blinks"
+        return (f"The lag cannot be estimated: {why}.",)
     if lag.p >= SIGNIFICANCE:
         return (
             "Ratings did not follow blinks: the greatest correlation of their change with blinks, "

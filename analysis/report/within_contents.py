@@ -14,6 +14,7 @@ from analysis.within.effects import Effect
 from analysis.within.multivariate_tests import MultivariateTest
 from analysis.within.simple_effects import SIGNIFICANCE, first_p
 from analysis.within.strata import UnivariateTest
+from table_files import counted
 
 # Sentences in APA style, one an effect.
 
@@ -113,19 +114,24 @@ def brief(analysis: Analysis) -> tuple[str, ...]:
     """Who was analyzed, each effect that was found with its size, and what was not shown."""
     tested = [effect for effect in analysis.anova.effects if math.isfinite(effect_p(analysis, effect))]
     shown = [effect for effect in tested if effect_p(analysis, effect) < SIGNIFICANCE]
-    lines = [f"{analysis.n_participants} participants had data in every cell."]
+    lines = [f"{counted(analysis.n_participants, 'participant')} had data in every cell."]
     lines += [_line(analysis, effect) for effect in shown]
-    rest = [analysis.labels.effect(effect.factors) for effect in tested if effect not in shown]
-    if rest:
+    rest = [effect for effect in tested if effect not in shown]
+    names = ", ".join(analysis.labels.effect(effect.factors) for effect in rest)
+    if len(rest) == 1:
         lines.append(
-            "These effects were not significant (which is not evidence that they are absent): "
-            f"{', '.join(rest)}."
+            "This effect was not significant (which is not evidence that it is absent): "
+            f"{names}, {statistics_in_brief(analysis, rest[0])}."
+        )
+    elif rest:
+        lines.append(
+            f"These effects were not significant (which is not evidence that they are absent): {names}."
         )
     return tuple(lines)
 
 
 def _line(analysis: Analysis, effect: Effect) -> str:
-    kind = "differ by" if len(effect.factors) == 1 else "differ by the interaction of"
+    kind = "differed by" if len(effect.factors) == 1 else "differed by the interaction of"
     said = f"Ratings {kind} {analysis.labels.effect(effect.factors)}"
     return f"{said}, {statistics_in_brief(analysis, effect)}{_means(analysis, effect)}."
 
@@ -158,7 +164,7 @@ METHODS = (
     "compared by t tests, paired within participants."
 )
 
-WITHIN_BARS = " Error bars in figures are 95% within-participant intervals (Cousineau 2005, Morey 2008)."
+WITHIN_BARS = " Error bars in figures are 95% within-participant intervals (Cousineau, 2005; Morey, 2008)."
 
 MODEL_BARS = " Figures show the estimated marginal means from the table and their 95% intervals."
 
@@ -170,7 +176,10 @@ def contents_of(
     return Contents(
         name=analysis.name,
         title=analysis.title,
-        lead=f"{analysis.n_participants} participants, {analysis.labels.effect(analysis.anova.factors)}",
+        lead=(
+            f"{counted(analysis.n_participants, 'participant')}, "
+            f"{analysis.labels.effect(analysis.anova.factors)}"
+        ),
         source=analysis.source,
         synthetic=analysis.synthetic,
         n_participants=analysis.n_participants,

@@ -158,7 +158,7 @@ def effect_size_table(analysis: Analysis) -> Table:
     )
     notes = (
         "ηₚ², ω²ₚ (partial), ηG² (generalized): univariate test; the interval uses the Greenhouse-Geisser "
-        "df. mv: ηₚ² of the multivariate test. Intervals: 95%, noncentral F (Steiger 2004).",
+        "df. mv: ηₚ² of the multivariate test. Intervals: 95%, noncentral F (Steiger, 2004).",
     )
     header = ("Effect", "ηₚ²", "95% CI", "ηG²", "ω²ₚ", "mv ηₚ²", "95% CI")
     return Table("effects", title_of(analysis, "Effect sizes"), header, rows, 1, notes)
@@ -227,8 +227,9 @@ def simple_effects_table(analysis: Analysis) -> Table:
         label = f"{analysis.labels.factor(simple.of)} at {analysis.labels.cell(simple.at)}"
         rows.append((label, f, df, p, p_value(simple.p_holm), share(size)))
     notes = (
-        "Each factor of a significant interaction at each level of the others, with the error term of the "
-        "full model. Holm: adjusted for the number of levels tested. ηₚ² belongs to the F in the same row.",
+        "Each factor of a significant interaction at each level of the others. Each simple effect is tested "
+        "with its own error term. Holm: adjusted for the number of levels tested. ηₚ² belongs to the F "
+        "in the same row.",
     )
     header = ("Simple effect", "F", "df", "p", "Holm", "ηₚ²")
     title = title_of(analysis, "Simple effects")

@@ -141,7 +141,7 @@ def _add_picture(document: "Document", picture: Picture, synthetic: bool) -> Non
     number = len(document.inline_shapes) + 1
     shape = document.add_picture(BytesIO(picture.png), width=Cm(WIDTH_CM))
     caption = _sayable(picture.caption) + (" (synthetic data)" if synthetic else "")
-    shown = _sayable(picture.alt) + (" Synthetic data." if synthetic else "")
+    shown = _sayable(picture.alt).removesuffix(".") + "." + (" Synthetic data." if synthetic else "")
     properties = shape._inline.docPr
     properties.set("name", f"Figure {number}")
     properties.set("title", caption)

@@ -5,7 +5,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.report.contents import Contents, DrawnPart, Progress
+from analysis.report.contents import Contents, DrawnPart, Part, Progress
 from analysis.report.formats import as_markdown
 from analysis.report.latex import NEEDS, as_document, as_latex
 from analysis.report.numbers import heading_pieces, pieces, signed_cell, with_minus
@@ -65,19 +65,7 @@ def write_report(
     """
     make_folder(folder)
     progress("figures")
-    parts = tuple(
-        DrawnPart(
-            part.title,
-            part.brief,
-            part.tables[0],
-            part.tables[1:],
-            part.sentences,
-            self_check(part.sentences),
-            part.draw(),
-            part.more(progress) if more else (),
-        )
-        for part in contents.parts
-    )
+    parts = tuple(_drawn(part, more, progress) for part in contents.parts)
     progress("report")
     files: dict[str, bytes] = {}
     drawn = [picture for part in parts for picture in part.pictures]
@@ -98,6 +86,16 @@ def write_report(
         with whole_file(folder / name) as temporary:
             temporary.write_bytes(content)
     return [folder / name for name in sorted(files)]
+
+
+def _drawn(part: Part, more: bool, progress: Progress) -> DrawnPart:
+    pictures = part.draw()
+    sections = part.more(progress) if more else ()
+    said = (*part.sentences, *(one for section in sections for one in section.sentences))
+    tables = part.tables
+    return DrawnPart(
+        part.title, part.brief, tables[0], tables[1:], said, self_check(said), pictures, sections
+    )
 
 
 def make_folder(folder: Path) -> None:

@@ -24,7 +24,7 @@ MAXIMUM_PLACES = 60
 
 @dataclass(frozen=True)
 class SimpleEffect:
-    """The test of factor `of` where the others have the levels `at`, with the error of the whole model.
+    """The test of factor `of` where the others have the levels `at`, with its own error term.
 
     `p_value` is that of the multivariate test where there is one, else Greenhouse-Geisser's; `p_holm` is
     adjusted for the places of this interaction at which `of` is tested.
@@ -63,7 +63,7 @@ def simple_effect(result: AnovaResult, of: str, at: Mapping[str, str]) -> Effect
     basis = design.basis
     # What rounding of the ratings alone can leave in a sum of squares.
     floor = z.size * (8 * np.finfo(float).eps * float(np.abs(result.y).max())) ** 2
-    # The error of the whole model: more df than the places by themselves would give.
+    # Of these contrasts only, but over all groups: more df than the groups by themselves would give.
     residual, directed = z - basis @ (basis.T @ z), directions @ z
     # Twice: the first projection leaves rounding errors.
     residual -= basis @ (basis.T @ residual)

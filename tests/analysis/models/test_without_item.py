@@ -51,5 +51,5 @@ def test_a_singular_fit_names_what_is_zero() -> None:
     # a random label: participants cannot differ in its effect
     rows["C"] = [("x", "y")[(7 * i + i // 3) % 2] for i in range(len(rows))]
     fit = fit_mixed(rows, "participant", "rating", ["C"], "clip", "all")
-    assert fit.singular == any("singular fit: the variance of participant C" in note for note in fit.notes)
+    assert fit.singular == any("slope variance of participant C is" in note for note in fit.notes)
     assert fit.singular

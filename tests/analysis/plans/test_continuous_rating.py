@@ -11,6 +11,7 @@ import pytest
 from analysis.plans.continuous_rating import clips_of
 from analysis.report.figures import traces_figure
 from analysis.report.pictures import STYLE
+from analysis.report.trace_contents import methods_of, sentences
 from analysis.traces import ClipTraces, mean_trace
 from experiments.errors import InputError
 
@@ -56,4 +57,16 @@ def test_the_figure_has_a_panel_a_cell(cells: int) -> None:
     with mpl.rc_context(STYLE):
         picture = traces_figure(traces, [f"cell {k}" for k in range(cells)], 0.9, synthetic=True)
     assert picture.png.startswith(b"\x89PNG")
-    assert f"in {cells} cells" in picture.alt
+    assert f"in {cells} cells, with blinks marked" in picture.alt
+
+
+def test_why_there_is_no_lag_is_said() -> None:
+    values = np.array([[50.0, 51.0, 49.0]])
+    blinking = mean_trace([ClipTraces("a", "x", 10.0, (0.1,), ("x",), values)])
+    still = mean_trace([ClipTraces("b", "y", 10.0, (), ("x",), values)])
+    assert sentences(None, [still]) == ("The lag cannot be estimated: the clips have no blinks.",)
+    assert "fewer than two people" in sentences(None, [still, blinking])[0]
+    assert "interval" not in methods_of([still], None)
+    assert "lag" not in methods_of([still], None)
+    with mpl.rc_context(STYLE):
+        assert "blinks" not in traces_figure([still], ["y"], 0.0, synthetic=True).alt

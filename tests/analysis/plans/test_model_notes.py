@@ -7,7 +7,7 @@ from analysis.models.mixed import fit_mixed
 from analysis.models.ordinal import fit_ordinal
 from analysis.models.random_part import MixedResult
 from analysis.plans.result import Labels
-from analysis.plans.sensitivity import notes_of
+from analysis.plans.sensitivity import SLOPES, notes_of
 
 LABELS = Labels({"fit": "Fit quality", "residual": "Left over"})
 
@@ -33,12 +33,17 @@ def mixed() -> MixedResult:
 
 
 def test_terms_have_labels_and_words_like_a_factor_have_none() -> None:
-    sds, singular, *_ = notes_of(mixed(), LABELS)
+    sds, slopes, *zero, singular = notes_of(mixed(), LABELS)
     assert sds.startswith("Standard deviations: participant: intercept 0.000, Fit quality ")
     assert ", Left over " in sds
     assert ", Fit quality × Left over " in sds
     assert "; residual " in sds
-    assert singular.startswith("singular fit: the variance of participant intercept, ")
+    assert slopes == SLOPES
+    assert zero[0].startswith(
+        "singular fit: the slope variance of participant Fit quality × Left over is estimated as zero, so "
+        "that the test of Fit quality × Left over is against the residual (df = "
+    )
+    assert singular.startswith("singular fit: the variance of participant intercept ")
     assert singular.endswith("which does not affect the tests of other effects")
 
 
@@ -59,4 +64,4 @@ def test_a_factor_that_moves_between_people_has_its_label() -> None:
 
 
 def test_without_labels_notes_are_as_the_model_says_them() -> None:
-    assert notes_of(mixed(), Labels())[1:] == mixed().notes
+    assert notes_of(mixed(), Labels())[2:] == mixed().notes

@@ -151,9 +151,8 @@ def test_origins_are_not_pooled(tmp_path, rows) -> None:
     mixed = change(rows, lambda row: row["run"] == "r1", run_origin="participant", synthetic=0)
     found = report(tmp_path, mixed)
     assert (found.n_participants, found.synthetic) == (1, False)
-    assert any(
-        "origin participant: 132 rows of other origins were ignored" in said for said in found.decisions
-    )
+    assert "only responses of origin participant were analyzed" in found.decisions
+    assert any("132 rows of other origins" in said for said in found.left_out)
     assert report(tmp_path, mixed, pool=Pool(Origin.ALL)).n_participants == 12
 
 
@@ -223,6 +222,13 @@ def test_what_cannot_be_fitted_has_its_counts_and_its_reason(tmp_path) -> None:
     found = report(tmp_path, rows)
     assert found.numbers["abilities"] is None
     assert f"{BEST} won every comparison" in found.numbers["abilities_reason"]
+    # Labels, and no option of a command: those are for the terminal.
+    assert found.parts[0].sentences == (
+        "The Davidson model could not be fitted by maximum likelihood, because Photorealistic, From the "
+        "model won every comparison with the others.",
+    )
+    assert "robust" not in found.methods
+    assert "ransitivity" not in found.methods
     assert [table.key for table in found.parts[0].tables] == ["pair-choices"]
     assert sum(pair["n"] for pair in found.numbers["pairs"]) == len(rows)
 

@@ -72,6 +72,10 @@ def test_the_mixed_model_counts_faces_as_a_sample(analysis: Analysis) -> None:
     random = fit_mixed(*common, random=["face"], random_slopes="all").effects[0]
     fixed = fit_mixed(*common).effects[0]
     assert table.rows[0][1] == f"{random.f_value:.3f}"
+    # Several columns name one grouping; to R a slash would add one of faces alone.
+    assert "(1 | face:exemplar)" in ordinal_model(analysis).tables[0].notes[0]
+    ours = analysis.anova.effect("profile").univariate.p_gg
+    assert bool(section.sentences) == (ours < 0.05)
     # 6 faces x 3 profiles leave 10 df at most; without them hundreds of trials pass for evidence.
     assert random.df_error < 15 < fixed.df_error
     assert random.p_value > 0.05 > fixed.p_value

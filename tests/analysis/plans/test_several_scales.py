@@ -159,4 +159,4 @@ def test_left_out_counts_plays_and_answers_that_a_scale_does_not_apply(tmp_path,
         if row["trial_index"] == last:
             row |= {"response": "", "verdict": "failed"}
     aside = report_of(tmp_path, rows)[1]["exclusions"]["set_aside"]
-    assert aside == ["1 presentations without a rating", "1 answers of 'does not apply'"]
+    assert aside == ["1 presentation without a rating", "1 answer of 'does not apply'"]

@@ -42,7 +42,7 @@ def test_means_are_the_ratings_own(tmp_path, rows) -> None:
     assert analysis.anova.y == pytest.approx(ratings.mean(axis=-1))
     assert analysis.anova.factors == ("lower_lid",)
     assert analysis.synthetic
-    assert left_out(analysis.exclusions) == ("no participant or trial was excluded (of 8 participants)",)
+    assert left_out(analysis.exclusions) == ("No analyzed trial was excluded (of 8 participants)",)
 
 
 def test_export_and_database_give_the_same_numbers(tmp_path, rows) -> None:
@@ -157,11 +157,11 @@ def test_practice_pilot_and_unrated_rows_are_set_aside_and_said(tmp_path, rows) 
     ]
     extra += [rows[2] | {"response": "", "trial_index": 92}]
     analysis = analyse(tmp_path, rows + extra, pool=Pool(Origin.SIMULATED))
-    assert "origin simulated: 1 rows of other origins were ignored" in analysis.decisions
-    assert set(analysis.exclusions.set_aside) == {
-        "1 practice trials",
-        "1 presentations without a rating",
-    }
+    assert "only responses of origin simulated were analyzed" in analysis.decisions
+    assert left_out(analysis.exclusions) == (
+        "No analyzed trial was excluded (of 8 participants); 1 row of other origins, 1 practice trial and "
+        "1 presentation without a rating were set aside",
+    )
 
 
 def test_a_rule_whose_column_is_missing_is_said_not_skipped(tmp_path, rows) -> None:

@@ -152,6 +152,18 @@ def test_a_series_that_cannot_be_fitted_is_said(tmp_path, rows) -> None:
     assert any("no function was fitted" in sentence for sentence in found.parts[0].sentences)
 
 
+def test_methods_describe_what_was_run(tmp_path) -> None:
+    everybody, one = (report(tmp_path, rows_of(people)) for people in (6, 1))
+    assert "REML" in everybody.methods
+    assert "paired t tests, Holm" in everybody.methods
+    assert "Welch" not in everybody.methods
+    assert "REML" not in one.methods
+    assert "t tests" not in one.methods
+    said = one.parts[0].sentences[0]
+    assert "where the function without guesses and lapses is one half" in said
+    assert "95% CI [" in said
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [

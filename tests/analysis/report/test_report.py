@@ -54,7 +54,7 @@ def test_the_paper_table_has_conditions_tests_and_interactions(analysis) -> None
     assert len(table.rows) == levels + len(analysis.anova.effects) - len(factors)
     assert "SYNTHETIC" in table.title
     mean = analysis.means[0]
-    assert table.rows[0][2] == f"{mean.mean:.2f} ({mean.se:.2f})"
+    assert table.rows[0][2] == f"{fixed(mean.mean)} ({fixed(mean.se)})"
     test = analysis.anova.effects[0]
     used = test.multivariate if all(e.multivariate for e in analysis.anova.effects) else test.univariate
     assert fixed(used.f_value) in table.rows[0]
@@ -194,12 +194,21 @@ def test_bayes_factors_are_next_to_the_planned_pairs(tmp_path) -> None:
         (share(-0.25), "-.250"),
         (fixed(-0.001), "0.00"),
         (interval((1.234, float("nan"))), "[1.23, –]"),
-        (sum_text(1234.5), "1234"),
+        (sum_text(1234.5), "1235"),
+        (fixed(71.75499999999998), "71.76"),
+        (fixed(-0.125), "-0.13"),
+        (fixed(1e30, 1), f"{1e30:.1f}"),
         (sum_text(0.01234), "0.0123"),
     ],
 )
 def test_numbers_are_printed_as_apa_has_them(made, text) -> None:
     assert made == text
+
+
+def test_every_pair_of_one_factor_has_a_bayes_factor(tmp_path) -> None:
+    """Planned or not: exp2 plans no pairs of characters."""
+    (table,) = bayes_factors(analysis_of("exp2", tmp_path, 24)).tables
+    assert len(table.rows) == 10 + 6 + 1
 
 
 def test_text_wraps_and_latex_escapes() -> None:
