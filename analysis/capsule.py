@@ -110,6 +110,24 @@ INTENDED = (
         r"Exclusions and decisions|decisions\b.*",
         "copied rows and repeated ids are named as decisions",
     ),
+    IntendedChange(
+        REWORDED,
+        r"Exclusions and decisions|exclusions\.set_aside\b.*|decisions\b.*",
+        "rows of other origins are counted among those set aside",
+    ),
+    IntendedChange(REWORDED, "Bayes factors", "every pair of levels has a Bayes factor, planned or not"),
+    IntendedChange(
+        REWORDED,
+        "Linear mixed model|Ordinal mixed model",
+        "formulas name a grouping by several columns with colons, and notes say what slopes are",
+    ),
+    IntendedChange(
+        REWORDED,
+        "Results|Every test|In brief|In sentences|Robust companions",
+        "halves are rounded away from zero, thresholds have intervals in sentences, and effects are named "
+        "on which the mixed model and the ANOVA disagree",
+    ),
+    IntendedChange(REWORDED, "Method", "methods that were not used are not described"),
     IntendedChange(REWORDED, r".*", "the wording is in plainer English; all numbers are equal", wording=True),
 )
 RENAMED = {
