@@ -123,7 +123,7 @@ INTENDED = (
     ),
     IntendedChange(
         REWORDED,
-        "Results|Every test|In brief|In sentences|Robust companions",
+        "In brief|In sentences|Robust companions",
         "halves are rounded away from zero, thresholds have intervals in sentences, and effects are named "
         "on which the mixed model and the ANOVA disagree",
     ),
