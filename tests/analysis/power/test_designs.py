@@ -276,7 +276,7 @@ def call(capsys, monkeypatch, tmp_path):
         "mixed --difference 0.3,0.6 --clips 6",
         "ordinal --difference 0.3,0.6 --shares 1,2,1 --clips 3",
         "pairs --abilities 0,0.3,0.6 --sd-rater 0.4 --tie 0.2",
-        "thresholds --levels 100,120,140 --threshold 120 --difference 10 --spread 10 --sd-people 5 --sd-difference 4",
+        "thresholds --levels 100,120,140 --threshold 120 --difference 10 --spread 10 --sd-difference 4",
     ],
 )
 def test_the_commands_write_table_text_figure_and_json(call, tmp_path, monkeypatch, arguments) -> None:

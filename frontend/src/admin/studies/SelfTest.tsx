@@ -152,7 +152,7 @@ export function SelfTest({ detail }: { detail: Schemas["StudyDetail"] }) {
     <Stack gap="xs" align="flex-start">
       <Text size="sm">
         4. Test the way back: a simulated participant with a test id takes a preview of the study in a separate window. The saved settings
-        are tested, by a preview link; links with a recruiter of their own are not.
+        are tested, by a preview link; links with a separate recruiter are not.
       </Text>
       <Button variant="default" onClick={begin} loading={test.isPending}>
         Test the way back
