@@ -157,7 +157,7 @@ def test_alembic_goes_down_to_no_program_that_would_miss_its_views(
     database: Database, empty_database_url: str
 ) -> None:
     called = subprocess.run(
-        [sys.executable, "-m", "alembic", "downgrade", "-1"],
+        [sys.executable, "-m", "alembic", "downgrade", "0032"],
         cwd=REPOSITORY,
         env={**os.environ, "DATABASE_URL": empty_database_url},
         capture_output=True,
@@ -274,7 +274,7 @@ def test_a_user_who_does_not_own_the_views_is_reported_in_one_line(database: Dat
         address = database.url.set(username=app, password="x").render_as_string(hide_password=False)
         other = Database(address)
         with pytest.raises(
-            InputError, match=r"must be owner of .*; let the user of DATABASE_URL own"
+            InputError, match=r"must be owner of .*; make the user of DATABASE_URL the owner"
         ) as raised:
             upgrade(other)
         other.close()
