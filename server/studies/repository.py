@@ -217,6 +217,11 @@ def builder_tab(session: Session, study: Study, account_id: int, tab: str) -> Bu
     return session.get(BuilderDraft, (study.id, account_id, tab))
 
 
+def own_builder_tab(session: Session, study: Study, account_id: int, tab: str) -> BuilderDraft:
+    """The row of one tab, which is known to exist."""
+    return session.get_one(BuilderDraft, (study.id, account_id, tab))
+
+
 def drafts_of(session: Session, study: Study, account_id: int) -> list[BuilderDraft]:
     """The drafts of one account, the latest first."""
     mine = (BuilderDraft.study_id == study.id, BuilderDraft.account_id == account_id)

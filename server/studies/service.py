@@ -347,7 +347,7 @@ MAX_DRAFT_BYTES = 1_000_000
 def _own_tab(session: Session, study: Study, identity: Identity, tab: str) -> BuilderDraft:
     key = {"study_id": study.id, "account_id": identity.account_id, "tab": tab}
     insert_once(session, BuilderDraft, [key | {"seen_at": now()}])  # two requests of a new tab may meet
-    row = session.get_one(BuilderDraft, tuple(key.values()))
+    row = repository.own_builder_tab(session, study, identity.account_id, tab)
     row.seen_at = now()
     return row
 
