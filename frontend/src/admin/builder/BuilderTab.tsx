@@ -5,17 +5,16 @@ import { useParams } from "@tanstack/react-router";
 import { useState } from "react";
 import { api, clipsQuery, type Schemas, unwrap, studyQuery } from "../api";
 import { Answer, onDemand } from "../ui/Answer";
-import { ConfirmButton } from "../ui/ConfirmButton";
 import { when } from "../ui/format";
 import { isTable } from "./data";
 import { isSame, type Meeting, meetingOf } from "./history";
-import { type Draft, forgetDraft, forgetWork, type Kept, keptWork, otherWork, tabOf } from "./kept";
+import { type Draft, forgetDraft, forgetWork, isUnsaved, type Kept, keptWork, otherWork, tabOf } from "./kept";
 import { meetingOfClips, type Place, storedPlaces } from "./places";
 
 const Workbench = onDemand(async () => (await import("./Workbench")).Workbench);
 const OfferedDrafts = onDemand(async () => (await import("./Drafts")).OfferedDrafts, null);
 const OtherEditors = onDemand(async () => (await import("./Drafts")).OtherEditors, null);
-const Difference = onDemand(async () => (await import("./Drafts")).Difference, null);
+const UnsavedWork = onDemand(async () => (await import("./Drafts")).UnsavedWork, null);
 
 export function BuilderTab() {
   const { study = "" } = useParams({ strict: false });
@@ -56,19 +55,16 @@ async function broughtTogether({ toml, data, base, places }: Kept, present: stri
   return { toml: merged.toml, data: merged.data, places: clips?.places ?? null, meeting };
 }
 
-/** Whether kept work differs from what is stored. */
-const isWork = ({ toml, data, places }: Kept, detail: Schemas["StudyDetail"]) => data !== null || places !== null || toml !== detail.toml;
-
 /** Begins with work kept in this browser, where there is some, else with what is stored. */
 function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   const { name, revision, rights } = detail.summary;
   const mayEdit = rights.includes("edit");
   const [kept, setKept] = useState<Kept | null>(() => {
     const work = keptWork(name);
-    return work !== null && isWork(work, detail) ? work : null;
+    return work !== null && isUnsaved(work, detail.toml) ? work : null;
   });
   const [from, setFrom] = useState({ toml: kept?.toml ?? detail.toml, data: kept?.data ?? null, places: kept?.places ?? null });
-  const [others, setOthers] = useState(() => otherWork(name).filter((work) => isWork(work, detail)));
+  const [others, setOthers] = useState(() => otherWork(name).filter((work) => isUnsaved(work, detail.toml)));
   const isMet =
     kept !== null &&
     from.toml === kept.toml &&
@@ -98,9 +94,7 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
   // Also where the server has it, which would offer it again.
   const discard = async (draft: Draft) => {
     forgetDraft(draft.key);
-    if (mayEdit)
-      await unwrap(api.DELETE("/api/admin/studies/{study}/drafts/{tab}", { params: { path: { study: name, tab: tabOf(draft) } } }));
-    await queries.invalidateQueries({ queryKey: ["drafts", name] });
+    if (mayEdit) await (await import("./Drafts")).discardDraft(queries, name, tabOf(draft));
     without(draft);
   };
   const startOver = () => {
@@ -130,20 +124,15 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
             </Group>
           )}
           {others.map((draft) => (
-            <Group key={draft.key} gap="xs" role="status">
-              <span>{`Another tab has unsaved work from ${when(draft.at)} on this study${draft.revision === revision ? "" : ", based on an earlier version"}.`}</span>
-              <Button size="compact-xs" variant="default" onClick={() => open(draft)}>
-                Open it here
-              </Button>
-              <ConfirmButton
-                size="compact-xs"
-                label="Discard it there"
-                question={`The unsaved work from ${when(draft.at)} is deleted permanently.`}
-                confirm="Discard the work"
-                onConfirm={() => void discard(draft)}
-              />
-              <Difference detail={detail} draft={draft} />
-            </Group>
+            <UnsavedWork
+              key={draft.key}
+              detail={detail}
+              draft={draft}
+              words={`Another tab has unsaved work from ${when(draft.at)} on this study${draft.revision === revision ? "" : ", based on an earlier version"}.`}
+              actions={["Open it here", "Discard it there", "Discard the work"]}
+              onOpen={() => open(draft)}
+              onDiscard={() => void discard(draft)}
+            />
           ))}
           {mayEdit && <OfferedDrafts detail={detail} onOpen={open} />}
           {mayEdit && <OtherEditors study={name} />}

@@ -2,14 +2,14 @@
 
 import { Button, Group, List, Text } from "@mantine/core";
 import { useDebouncedCallback } from "@mantine/hooks";
-import { useQuery, useQueryClient } from "@tanstack/react-query";
+import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useState } from "react";
 import { api, type Schemas, unwrap } from "../api";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { counted, plain, when } from "../ui/format";
 import { isTable } from "./data";
 import { changesBetween, placeName } from "./history";
-import { type Draft, keptFrom, otherWork, tab, tabOf } from "./kept";
+import { type Draft, isUnsaved, keptFrom, otherWork, tab, tabOf } from "./kept";
 import type { Builder } from "./useBuilder";
 
 // This tab's work on its way to the server.
@@ -70,6 +70,12 @@ const draftsQuery = (study: string) => ({
   queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/drafts", { params: { path: { study } } })),
 });
 
+/** Deletes what the server has of a tab, so that it is not offered again. */
+export async function discardDraft(queries: QueryClient, study: string, own: string): Promise<void> {
+  await discard(study, own);
+  await queries.invalidateQueries({ queryKey: draftsQuery(study).queryKey });
+}
+
 /** Drafts of this person on the server that this browser does not have itself. */
 export function OfferedDrafts({ detail, onOpen }: OfferProps) {
   const { name } = detail.summary;
@@ -78,32 +84,52 @@ export function OfferedDrafts({ detail, onOpen }: OfferProps) {
   const here = new Set([tab, ...otherWork(name).map(tabOf), ...(opened.get(name) ?? [])]);
   const offered = stored.flatMap((draft): Draft[] => {
     const work = keptFrom({ ...draft.work, at: draft.at });
-    const isNone = work === null || (work.data === null && work.places === null && work.toml === detail.toml);
-    return isNone || here.has(draft.tab) ? [] : [{ ...work, key: draft.tab }];
+    return work === null || !isUnsaved(work, detail.toml) || here.has(draft.tab) ? [] : [{ ...work, key: draft.tab }];
   });
   const open = (draft: Draft) => {
     if (onOpen(draft)) opened.set(name, new Set([...(opened.get(name) ?? []), draft.key]));
   };
-  const forget = async (draft: Draft) => {
-    await discard(name, draft.key);
-    await queries.invalidateQueries({ queryKey: draftsQuery(name).queryKey });
-  };
   return offered.map((draft) => (
-    <Group key={draft.key} gap="xs" align="start" role="status">
-      <span>{`Your unsaved work from ${when(draft.at)}, in another browser, is on the server.`}</span>
-      <Button size="compact-xs" variant="default" onClick={() => open(draft)}>
-        Open the draft
+    <UnsavedWork
+      key={draft.key}
+      detail={detail}
+      draft={draft}
+      words={`Your unsaved work from ${when(draft.at)}, in another browser, is on the server.`}
+      actions={["Open the draft", "Discard the draft", "Discard"]}
+      onOpen={() => open(draft)}
+      onDiscard={() => void discardDraft(queries, name, draft.key)}
+    />
+  ));
+}
+
+interface UnsavedProps {
+  detail: Schemas["StudyDetail"];
+  draft: Draft;
+  words: string;
+  /** Labels of the buttons that open it, ask to discard it, and discard it. */
+  actions: [string, string, string];
+  onOpen: () => void;
+  onDiscard: () => void;
+}
+
+/** Work of another tab or browser: what it would change, to be opened or discarded. */
+export function UnsavedWork({ detail, draft, words, actions: [open, label, confirm], onOpen, onDiscard }: UnsavedProps) {
+  return (
+    <Group gap="xs" align="start" role="status">
+      <span>{words}</span>
+      <Button size="compact-xs" variant="default" onClick={onOpen}>
+        {open}
       </Button>
       <ConfirmButton
         size="compact-xs"
-        label="Discard the draft"
+        label={label}
         question={`The unsaved work from ${when(draft.at)} is deleted permanently.`}
-        confirm="Discard"
-        onConfirm={() => void forget(draft)}
+        confirm={confirm}
+        onConfirm={onDiscard}
       />
       <Difference detail={detail} draft={draft} />
     </Group>
-  ));
+  );
 }
 
 const MAX_CHANGES = 20;
@@ -115,7 +141,7 @@ function shortly(value: unknown): string {
 }
 
 /** What a draft changes in the study as it is now. */
-export function Difference({ detail, draft }: { detail: Schemas["StudyDetail"]; draft: Draft }) {
+function Difference({ detail, draft }: { detail: Schemas["StudyDetail"]; draft: Draft }) {
   const changes = useQuery({
     queryKey: ["draft difference", detail.toml, draft.toml, draft.data],
     queryFn: async () => {

@@ -6,6 +6,7 @@ import { type KeyboardEvent, useEffect, useMemo, useRef, useState } from "react"
 import { UploadClips } from "../clips/UploadClips";
 import { playNeeded, useUpload } from "../clips/useUpload";
 import { declaredPattern, fieldsOf, levelsByPattern } from "../studies/file-pattern";
+import { useDropTarget } from "../ui/DropZone";
 import { counted } from "../ui/format";
 import { type Data, listAt, textAt } from "./data";
 import { arrangementOf, factorsOf, filledByPattern, isClip, type Place, reconciled, type Slot, withMoved } from "./places";
@@ -89,7 +90,10 @@ interface SpotProps extends Hand {
 }
 
 function Spot({ slot, clip, held, hold, put }: SpotProps) {
-  const [over, setOver] = useState(false);
+  const { over, handlers } = useDropTarget(
+    () => held !== null && slot !== null,
+    () => held !== null && slot !== null && put(held, slot),
+  );
   const press = () => {
     if (held === null) hold(clip);
     else if (clip === held) hold(null);
@@ -122,17 +126,7 @@ function Spot({ slot, clip, held, hold, put }: SpotProps) {
         hold(clip);
       }}
       onDragEnd={() => hold(null)}
-      onDragOver={(event) => {
-        if (held === null || slot === null) return;
-        event.preventDefault();
-        setOver(true);
-      }}
-      onDragLeave={() => setOver(false)}
-      onDrop={(event) => {
-        event.preventDefault();
-        setOver(false);
-        if (held !== null && slot !== null) put(held, slot);
-      }}
+      {...handlers}
     >
       {clip !== null && <Thumbnail clip={clip} />}
       <span className="spot-name">{what}</span>

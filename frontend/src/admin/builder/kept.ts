@@ -20,6 +20,9 @@ export interface Kept {
   at: string;
 }
 
+/** Whether kept work differs from the stored text. */
+export const isUnsaved = ({ toml, data, places }: Kept, stored: string): boolean => data !== null || places !== null || toml !== stored;
+
 export interface Draft extends Kept {
   /** Where it is kept. */
   key: string;
