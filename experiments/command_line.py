@@ -1,6 +1,7 @@
 """How every command line of the project ends: one clear line for bad input, never a traceback."""
 
 import errno
+import os
 import sys
 from collections.abc import Callable
 from typing import Any, NoReturn, Protocol, cast
@@ -68,6 +69,15 @@ class UsageError(Protocol):
 
     def format_message(self) -> str:
         """What is wrong, without the usage."""
+
+
+def run_privately(app: Callable[..., object]) -> None:
+    """As `run_command_line`; files that the app writes are for its own user alone."""
+    before = os.umask(0o077)
+    try:
+        run_command_line(app)
+    finally:
+        os.umask(before)
 
 
 def run_command_line(app: Callable[..., object]) -> None:

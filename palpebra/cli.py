@@ -5,7 +5,7 @@ import sys
 from importlib import import_module, metadata
 
 from experiments.command_groups import lazy_app
-from experiments.command_line import run_command_line
+from experiments.command_line import run_privately
 from palpebra.conflicts import refuse_foreign_packages
 from palpebra.folders import DATA_VARIABLE, default_folder
 
@@ -71,11 +71,7 @@ def main() -> None:
         import_module(PROGRAMS[arguments[0]]).main()
         return
     sys.argv = [sys.argv[0], *with_start(arguments)]
-    before = os.umask(0o077)
-    try:
-        run_command_line(_checked_app)
-    finally:
-        os.umask(before)
+    run_privately(_checked_app)
 
 
 def _checked_app(**settings: object) -> object:

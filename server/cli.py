@@ -1,12 +1,9 @@
 """The command `server`: lists the commands; each lives with its subject and is loaded when called."""
 
-import os
-
 from experiments.command_groups import lazy_app
-from experiments.command_line import run_command_line
+from experiments.command_line import run_privately
 from experiments.errors import InputError
 
-PRIVATE = 0o077
 COMMANDS = {
     "run": (
         "server.cli_run",
@@ -96,8 +93,4 @@ def main() -> None:
 
     What it writes (database, clips, reports, exports) is for its own user alone.
     """
-    before = os.umask(PRIVATE)
-    try:
-        run_command_line(_call)
-    finally:
-        os.umask(before)
+    run_privately(_call)

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from experiments.declaration.base import Declaration
-from experiments.rules.screening import FAILED_CHECK
+from experiments.rules.screening import failed_checks
 
 # A rule of [[exclusions]] excludes whole runs or single trials, based on their data.
 # A rule is a class: its keys, and a method that decides. The analysis calls it for every kind of trial.
@@ -134,7 +134,7 @@ class ExcludeAttention(LeavesOutRuns):
 
     def reason(self) -> str:
         """The reason in words, for a Methods section."""
-        return f"{self.more_than + 1} or more failed attention checks" if self.more_than else FAILED_CHECK
+        return failed_checks(self.more_than)
 
     def excludes(self, run: RunTrials) -> str | None:
         """How many checks were answered incorrectly, or not at all."""

@@ -29,7 +29,11 @@ class AttentionChecks(Declaration):
 # Screening by failed attention checks.
 
 
-FAILED_CHECK = "a failed attention check"
+def failed_checks(allowed: int) -> str:
+    """The reason of a rule that allows so many failed attention checks."""
+    return f"{allowed + 1} or more failed attention checks" if allowed else "a failed attention check"
+
+
 NO_BRACES = str.maketrans("{}", "()")
 """Sentences of a Methods section have their numbers in braces."""
 
@@ -44,7 +48,7 @@ class ScreenAttention(Declaration):
 
     def reason(self) -> str:
         """The reason in words, for a Methods section."""
-        return f"{self.more_than + 1} or more failed attention checks" if self.more_than else FAILED_CHECK
+        return failed_checks(self.more_than)
 
 
 # Screening by the device.

@@ -51,6 +51,7 @@ from server.studies.links import (
 from server.studies.lookup import active_version, find_study, must_not_be_archived
 from server.studies.repository import links_of
 from server.studies.schemas import LaunchCheck
+from server.studies.series import content_of
 
 study_app = command_group("Studies on this server.")
 link_app = command_group("Links for participants.")
@@ -129,8 +130,8 @@ def _same_version(session: Session, study: Study, sha256: str, manifest: Manifes
         return None
     version = active_version(session, study)
     known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips}
-    given = {(clip.cell, clip.exemplar, clip.sha256) for clip in manifest.clips}
-    return version if version.definition_sha256 == sha256 and known == given else None
+    same = version.definition_sha256 == sha256 and known == content_of(manifest.clips)
+    return version if same else None
 
 
 def _urls(settings: Settings, session: Session, study: Study) -> list[tuple[str, str]]:

@@ -74,6 +74,11 @@ Content = set[tuple[str, int, str]]
 """Cell, exemplar and hash of each clip."""
 
 
+def content_of(clips: Sequence[Clip]) -> Content:
+    """By which two versions show the same clips in the same cells, or not."""
+    return {(clip.cell, clip.exemplar, clip.sha256) for clip in clips}
+
+
 def series_for(study: Study, experiment: Experiment, clips: Content) -> int:
     """The series of a further version: the latest whose versions all measure the same by the same clips.
 
@@ -100,7 +105,7 @@ def effects_of_edit(
     """What saving this definition as a further version would do to the answers that are stored."""
     present = active_version(session, study)
     known = Manifest.model_validate(present.manifest).clips
-    clips = {(clip.cell, clip.exemplar, clip.sha256) for clip in known}
+    clips = content_of(known)
     if places is not None:
         order = experiment.factor_names
         clips = {
