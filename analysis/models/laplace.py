@@ -148,7 +148,8 @@ class Trials:
         self.f_upper, self.f_lower = self.upper * self.above, self.lower * special.expit(-b)
         # exp(b - a) from the edges alone: eta cancels, and an open end gives 0.
         gap = np.exp(-(edges[category + 1] - edges[category]))
-        self.log_likelihood = float((special.log_expit(a) + special.log_expit(-b) + np.log1p(-gap)).sum())
+        self.log_chances = special.log_expit(a) + special.log_expit(-b) + np.log1p(-gap)
+        self.log_likelihood = float(self.log_chances.sum())
         self.between = gap / (1 - gap)
         self.slope = self.lower - self.above
         self.weight = self.f_upper + self.f_lower

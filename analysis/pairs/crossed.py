@@ -310,14 +310,12 @@ def laplace_error(data: CrossedPairs, theta: Array) -> float:
     mode, (raters, items) = likelihood.u, data.shape
     fixed = data.x @ theta[:f] + data.others @ (sd[data.of_column] * likelihood.v)
     spread = WIDER * np.linalg.cholesky(blocks.inverse)
-    ends = np.concatenate([[-np.inf], thresholds, [np.inf]])
-    upper, lower = ends[data.category + 1], ends[data.category]
 
     def joint(u: Array) -> Array:
         """Log of likelihood and density of the effects u (G, k), by rater."""
         eta = fixed + sd[0] * (likelihood.own @ u.ravel())
-        chance = special.expit(upper - eta) - special.expit(lower - eta)
-        by_rater = np.bincount(data.rater, np.log(np.maximum(chance, 1e-300)), raters)
+        log_chances = Trials(thresholds, data.category, eta).log_chances
+        by_rater = np.bincount(data.rater, log_chances, raters)
         return np.asarray(by_rater - (u**2).sum(axis=1) / 2)
 
     # Fewer draws for larger tables, whose raters have more answers each.
