@@ -1,4 +1,4 @@
-"""How the cartoon is inked: paths, tapered strokes and soft shades, in mm with y up."""
+"""How drawn characters are inked (paths, strokes, shades; mm, y up), and what differs between them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

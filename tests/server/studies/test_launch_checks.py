@@ -464,7 +464,7 @@ def test_a_clip_that_hangs_the_decoder_gets_the_fault_and_the_others_their_turn(
     manifest = make_clip_folder(parse_experiment(READY), folder, frames=5)
     store_clips(services.clips, manifest, folder)
     pipe = tmp_path / "hangs.mp4"
-    os.mkfifo(pipe)  # whoever opens it waits for somebody to write
+    os.mkfifo(pipe)  # opening it waits until something is written
     path_of = StoredClips._path
     first = manifest.clips[0]
     monkeypatch.setattr(

@@ -6,7 +6,8 @@ import pytest
 from experiments.errors import InputError
 from stimuli_builder.characters.cartoon import LEVELS, OPENING_MM, crop_px, draw_frame, fingerprint
 from stimuli_builder.characters.cartoon_eye import margins
-from stimuli_builder.characters.cartoon_pen import CARTOON, WILLOW, CartoonLook
+from stimuli_builder.characters.cartoon_pen import CARTOON, LOOKS, WILLOW, CartoonLook
+from stimuli_builder.clips.characters import DRAWN
 
 SIZE = (1920, 720)
 PX_PER_MM = 15.0
@@ -78,6 +79,11 @@ def test_levels_are_close_enough_to_interpolate(closure: float) -> None:
 def test_closure_outside_its_range_is_refused(closure: float) -> None:
     with pytest.raises(InputError, match="closure must lie between"):
         draw_frame(closure, (320, 120))
+
+
+def test_every_look_is_a_character() -> None:
+    """The names stand apart from the looks, which need the drawing library."""
+    assert tuple(LOOKS) == DRAWN
 
 
 def test_each_drawing_has_its_own_fingerprint() -> None:
