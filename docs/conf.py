@@ -60,6 +60,7 @@ html_theme_options = {
     "pygments_dark_style": "a11y-high-contrast-dark",
 }
 html_context = {"default_mode": "auto"}
-html_sidebars = {"index": [], "search": []}
+# A decision's sidebar would list all the other decisions: two megabytes that nobody reads.
+html_sidebars = {"index": [], "search": [], "explanation/decisions/0*": []}
 copybutton_prompt_text = "$ "
 suppress_warnings = ["myst.xref_missing"] if "--allow-missing" in sys.argv else []

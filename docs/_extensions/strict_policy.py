@@ -15,18 +15,39 @@ from typing import Any
 from bs4 import BeautifulSoup, Tag
 from docutils import nodes
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx import addnodes
 from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
 from sphinx.errors import ExtensionError
 
 FOLDER = "_static/inline"
+# Only a choice of versions reads the page's name, and it would be one small file for every page.
+PAGE_NAME = "DOCUMENTATION_OPTIONS.pagename"
 NUMBERED = re.compile(r"\\tag\{(.+?)\}")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Connect to Sphinx."""
     app.add_html_math_renderer("mathml", (_write_inline_formula, None), (_write_formula, None))
+    app.connect("env-updated", drop_copied_pictures)
+    app.connect("doctree-resolved", link_to_pictures)
     app.connect("build-finished", move_inline_code)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def drop_copied_pictures(app: Sphinx, environment: BuildEnvironment) -> None:
+    """Copy no picture a second time because a page links to it at full size."""
+    for path in [path for path in environment.dlfiles if str(path) in environment.images]:
+        del environment.dlfiles[path]
+
+
+def link_to_pictures(app: Sphinx, page: nodes.document, name: str) -> None:
+    """Let a link to a picture that some page shows lead to the copy that is shown."""
+    for link in list(page.findall(addnodes.download_reference)):
+        path, _ = app.env.relfn2path(link["reftarget"], name)
+        if path in app.env.images:
+            target = f"{'../' * name.count('/')}_images/{app.env.images[path][1]}"
+            link.replace_self(nodes.reference("", "", *link.children, internal=True, refuri=target))
 
 
 def _write_inline_formula(writer: Any, node: nodes.math) -> None:
@@ -53,7 +74,9 @@ def without_inline_code(page: Path, site: Path) -> str:
     soup = BeautifulSoup(page.read_text(encoding="utf-8"), "html.parser")
     up = "../" * len(page.relative_to(site).parent.parts)
     for script in soup.find_all("script", src=False):
-        if script.get("type", "text/javascript") in ("text/javascript", "module"):
+        if (script.string or "").lstrip().startswith(PAGE_NAME):
+            script.decompose()
+        elif script.get("type", "text/javascript") in ("text/javascript", "module"):
             text = script.string or ""
             script.clear()
             script["src"] = up + _kept(site, text, "js")
