@@ -35,7 +35,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
-def drop_copied_pictures(app: Sphinx, environment: BuildEnvironment) -> None:
+def drop_copied_pictures(_app: Sphinx, environment: BuildEnvironment) -> None:
     """Copy no picture a second time because a page links to it at full size."""
     for path in [path for path in environment.dlfiles if str(path) in environment.images]:
         del environment.dlfiles[path]
