@@ -16,7 +16,7 @@ from blink_engine.parameters import (
     StateName,
     default_parameters,
 )
-from blink_engine.performance import BlinkEngine, LidFrame, Performance, StateChange, perform
+from blink_engine.performance import BlinkEngine, Hold, LidFrame, Performance, StateChange, perform
 from blink_engine.plan import Blink, BlinkShape
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "Drift",
     "Event",
     "EventKind",
+    "Hold",
     "Law",
     "LidFrame",
     "Parameters",

@@ -1,8 +1,9 @@
 """The lids at a moment, one call per frame, and a whole performance at once."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -72,6 +73,17 @@ class BlinkEngine:
         """Report an event, in order of time; an event in the past counts as happening at the last frame."""
         time_s = self._reach(event.time_s)
         self._plan.notify(Event(event.kind, time_s, event.amplitude_deg))
+
+    def hold_blinks(self, held: bool, time_s: float | None = None) -> None:
+        """Hold blinks back while a flag of yours is up (True), and blink again once it is down (False).
+
+        A blink that has begun finishes. One that was due meanwhile begins when the flag goes down.
+        """
+        reached = self._reach(time_s)
+        if held:
+            self._plan.hold()
+        else:
+            self._plan.release(reached)
 
     def _reach(self, time_s: float | None) -> float:
         """Plan up to a happening: what began before it is not its to move."""
@@ -146,6 +158,14 @@ class StateChange:
     time_s: float
 
 
+@dataclass(frozen=True)
+class Hold:
+    """From `start_s` to `end_s` the eyes stay open."""
+
+    start_s: float
+    end_s: float
+
+
 @dataclass(frozen=True, eq=False)
 class Performance:
     """Lid curves of both eyes at `fps`: each array has a value a frame, as in `LidFrame`."""
@@ -168,6 +188,7 @@ def perform(
     state: StateName = "rest",
     events: Iterable[Event] = (),
     changes: Iterable[StateChange] = (),
+    holds: Iterable[Hold] = (),
     parameters: Parameters | None = None,
     ends_open: bool = False,
 ) -> Performance:
@@ -183,6 +204,9 @@ def perform(
         As for `BlinkEngine`.
     events : iterable of Event
     changes : iterable of StateChange
+    holds : iterable of Hold
+        When the eyes stay open. A blink that would reach into a hold is left out, unlike in a stream, which
+        does not know the future. A blink that is due within a hold begins at its end.
     ends_open : bool, optional
         Leave out a blink that would not be over at the end, as for a clip; without it the last frames may
         show half a blink, as the same moments of a stream do.
@@ -208,7 +232,12 @@ def perform(
     if not 0.0 < duration_s < 1e7:
         raise ValueError(f"expected a duration above 0 s and below 10,000,000 s, got {duration_s}")
     chosen = parameters or default_parameters()
-    blinks = plan_blinks(duration_s, BlinkPlan(chosen, state, seed), events, changes)
+    open_spans = _join_holds(holds)
+    blinks = plan_blinks(duration_s, BlinkPlan(chosen, state, seed), events, changes, open_spans)
+    # The hold that follows each onset; one at infinity follows the last.
+    starts = np.array([*(one.start_s for one in open_spans), math.inf])
+    following = starts[np.searchsorted(starts, [blink.onset_s for blink in blinks])]
+    blinks = [blink for blink, start_s in zip(blinks, following, strict=True) if blink.end_s <= start_s]
     # The last frame of n is at duration - 1 / fps.
     if ends_open:
         blinks = [blink for blink in blinks if blink.end_s <= duration_s - 1.0 / fps]
@@ -228,22 +257,42 @@ def perform(
 
 
 def plan_blinks(
-    duration_s: float, plan: BlinkPlan, events: Iterable[Event], changes: Iterable[StateChange]
+    duration_s: float,
+    plan: BlinkPlan,
+    events: Iterable[Event],
+    changes: Iterable[StateChange],
+    holds: Sequence[Hold] = (),
 ) -> list[Blink]:
-    """Return every blink that begins within the duration, with events and state changes in their order."""
-    happenings: list[Event | StateChange] = [*changes, *events]
-    # States first: an event at that moment is answered as in the state that it finds.
-    happenings.sort(key=lambda one: (one.time_s, isinstance(one, Event)))
+    """Return every blink that begins within the duration, with events, state changes and holds in order."""
+    happenings: list[tuple[float, Callable[[], None]]] = [
+        # States first: an event at that moment is answered as in the state that it finds.
+        *((one.time_s, partial(plan.set_state, one.state, one.time_s)) for one in changes),
+        *((one.start_s, plan.hold) for one in holds),
+        *((one.end_s, partial(plan.release, one.end_s)) for one in holds),
+        *((one.time_s, partial(plan.notify, one)) for one in events),
+    ]
+    # The sort keeps this order where times are equal.
+    happenings.sort(key=lambda one: one[0])
     blinks: list[Blink] = []
-    for happening in happenings:
-        if happening.time_s > duration_s:
+    for time_s, happen in happenings:
+        if time_s > duration_s:
             break
-        blinks += plan.due(happening.time_s)
-        if isinstance(happening, Event):
-            plan.notify(happening)
-        else:
-            plan.set_state(happening.state, happening.time_s)
+        blinks += plan.due(time_s)
+        happen()
     return [*blinks, *plan.due(duration_s)]
+
+
+def _join_holds(holds: Iterable[Hold]) -> list[Hold]:
+    """Holds in order; those that touch or overlap are one."""
+    joined: list[Hold] = []
+    for one in sorted(holds, key=lambda hold: hold.start_s):
+        if not one.start_s < one.end_s:
+            raise ValueError(f"expected a hold that ends after its start, got {one}")
+        if joined and one.start_s <= joined[-1].end_s:
+            joined[-1] = Hold(joined[-1].start_s, max(joined[-1].end_s, one.end_s))
+        else:
+            joined.append(one)
+    return joined
 
 
 def _lay(blinks: Sequence[Blink], count: int, fps: float, *, right: bool) -> Array:

@@ -139,6 +139,7 @@ class BlinkPlan:
         self._spontaneous_s = self._drifted(met) * self._intervals.uniform()
         self._answer_s, self._answer_cause = math.inf, ""
         self._anticipated = 0
+        self._held = False
 
     def set_state(self, state: StateName, time_s: float) -> None:
         """Enter a state: what is left of the interval is stretched to the new state's mean."""
@@ -160,9 +161,20 @@ class BlinkPlan:
             delay = response.earliest_s + latency * (response.latest_s - response.earliest_s)
             self._answer(event.time_s + max(0.0, delay), event.kind)
 
+    def hold(self) -> None:
+        """Let no blink begin until `release`."""
+        self._held = True
+
+    def release(self, time_s: float) -> None:
+        """Let blinks begin again; what was due meanwhile comes at once, as one blink."""
+        self._held = False
+        # Where both are late, the answer replaces the spontaneous blink in `due`, as always.
+        self._spontaneous_s = max(self._spontaneous_s, time_s)
+        self._answer_s = max(self._answer_s, time_s)
+
     def due(self, until_s: float) -> Iterator[Blink]:
         """Yield the blinks that begin at or before `until_s`, in order; each is yielded once."""
-        while min(self._spontaneous_s, self._answer_s) <= until_s:
+        while not self._held and min(self._spontaneous_s, self._answer_s) <= until_s:
             if self._answer_s <= self._spontaneous_s:
                 onset, cause = self._answer_s, self._answer_cause
                 self._answer_s = math.inf

@@ -85,6 +85,16 @@ def frames() -> dict[str, Any]:
     return {"seed": 7, "given": given, "frames": [list(asdict(engine.frame(*one)).values()) for one in given]}
 
 
+def held_frames() -> dict[str, Any]:
+    """A stream whose flag goes up and down every 7 s."""
+    engine, left = BlinkEngine(seed=5, state="speaking"), []
+    for k in range(400):
+        if k % 70 == 0:
+            engine.hold_blinks(k % 140 == 70, k / 10)
+        left.append(round(engine.frame(k / 10).left, 9))
+    return {"seed": 5, "state": "speaking", "left": left}
+
+
 def vectors() -> dict[str, Any]:
     """Return what the file holds."""
     return {
@@ -93,6 +103,7 @@ def vectors() -> dict[str, Any]:
         "numbers": numbers(),
         "performances": performances(),
         "frames": frames(),
+        "held": held_frames(),
     }
 
 

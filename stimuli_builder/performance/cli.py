@@ -63,6 +63,15 @@ def performance(
             )
         ),
     ] = None,
+    blink_while_down: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "CSV of a flag (time_s, flag: 0 down, 1 up; or start_s, end_s of when it is up): blinks come "
+                "while it is down, and the eyes stay open while it is up."
+            )
+        ),
+    ] = None,
     target: Annotated[str, typer.Option(help="Object (Blender) or node (Maya) with the shapes.")] = "",
     left: Annotated[str, typer.Option(help="Name of the left eye's shape or attribute.")] = "eyeBlinkLeft",
     right: Annotated[str, typer.Option(help="Name of the right eye's shape or attribute.")] = "eyeBlinkRight",
@@ -80,6 +89,8 @@ def performance(
       stimuli performance --duration 20 --blinks-at onsets.csv --complete 1 --out given.csv
 
       stimuli performance --duration 20 --gaze gaze.csv --format arkit --out looks.csv
+
+      stimuli performance --duration 20 --blink-while-down flag.csv --out held.csv
 
       stimuli performance speech.wav --lively 0.8 --fps 25 --format liveportrait --out eyes.csv
     """
@@ -101,6 +112,7 @@ def performance(
             complete,
             lively,
             gaze,
+            blink_while_down,
             CurveTarget(target, left, right),
         )
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from webvtt.models import Caption
 
-from blink_engine import Event, Performance, StateName, default_parameters, perform
+from blink_engine import Event, Hold, Performance, StateName, default_parameters, perform
 from blink_engine.laws import Law
 from blink_engine.parameters import Parameters
 from blink_engine.performance import GAZE_CLOSURE_MAX
@@ -184,6 +184,7 @@ class PerformanceJob:
     complete: float | None = None
     lively: float | None = None
     gaze: Path | None = None
+    flag: Path | None = None
     target: CurveTarget = field(default_factory=CurveTarget)
 
 
@@ -202,6 +203,7 @@ def write_performance(job: PerformanceJob) -> None:
     onsets = [] if job.blinks_at is None else _onsets(job.blinks_at, duration_s)
     gaze = None if job.gaze is None else read_gaze(job.gaze, duration_s)
     shifts = [] if gaze is None else gaze_shifts(gaze)
+    holds = [] if job.flag is None else read_flag(job.flag, duration_s)
     parameters = _parameters(job, state)
     done = perform(
         duration_s,
@@ -211,6 +213,7 @@ def write_performance(job: PerformanceJob) -> None:
         # Given onsets are every blink: those of speech and gaze would come on top.
         events=[Event("blink", one) for one in onsets] if onsets else [*speech_events(stretches), *shifts],
         changes=speech_states(stretches, state) if stretches else (),
+        holds=holds,
         parameters=parameters,
         # A clip that stops in mid-blink cannot be looped or joined.
         ends_open=True,
@@ -224,6 +227,9 @@ def write_performance(job: PerformanceJob) -> None:
         stream.write(text)
     spoken_s = sum(one.end_s - one.start_s for one in stretches)
     heard = f"{spoken_s:.1f} s of speech in {len(stretches)} stretches; " if stretches else ""
+    held_s = sum(one.end_s - one.start_s for one in holds)
+    if job.flag is not None:
+        heard += f"the flag is up for {held_s:.1f} s; "
     Console(markup=False).print(
         f"{heard}{counted(len(done.blinks), 'blink')} in {duration_s:.1f} s, {done.left.size} frames at "
         f"{job.fps:g} fps; wrote {job.out}"
@@ -277,6 +283,56 @@ def _onsets(path: Path, duration_s: float) -> list[float]:
             said = f"expected {least:g} s between blinks, got {earlier:g} and {later:g} s"
             raise InputError(f"{path}: {said}")
     return onsets
+
+
+# While a flag is up, blinks are held back.
+
+FLAGS = {"0": False, "down": False, "false": False, "1": True, "up": True, "true": True}
+
+
+def read_flag(path: Path, duration_s: float) -> list[Hold]:
+    """When a flag is up: a CSV with time_s and flag (it keeps its value), or with start_s and end_s.
+
+    Raises
+    ------
+    InputError
+        A column is missing, a value is neither up nor down, or times are impossible.
+    """
+    table = named_rows(path)
+    spans = "start_s" in table.header and "end_s" in table.header
+    if not spans and not {"time_s", "flag"} <= set(table.header):
+        raise InputError(
+            f"{path}: expected the columns time_s and flag, or start_s and end_s, got "
+            f"{', '.join(table.header)}"
+        )
+    names = ("start_s", "end_s") if spans else ("time_s",)
+    rows = [row for _, row in table.rows]
+    try:
+        times = np.array([[float(row[name]) for name in names] for row in rows])
+    except ValueError as error:
+        raise InputError(f"{path}: expected seconds: {error}") from error
+    # NaN is in no range. A track of flags may go on after the end.
+    if not len(times) or not ((times[:, 0] >= 0) & (times[:, 0] <= duration_s)).any():
+        raise InputError(f"{path}: expected times from 0 to {duration_s:g} s; correct them or --duration")
+    if spans:
+        if not (np.isfinite(times).all() and (times[:, 0] < times[:, 1]).all()):
+            raise InputError(f"{path}: expected each end_s after its start_s")
+        starts, ends = times.T
+    else:
+        if not (np.isfinite(times).all() and (np.diff(times[:, 0]) > 0).all()):
+            raise InputError(f"{path}: expected rising times in every row")
+        texts = [row["flag"].strip().lower() for row in rows]
+        unknown = next((text for text in texts if text not in FLAGS), None)
+        if unknown is not None:
+            raise InputError(f"{path}: flag: expected 0 (down) or 1 (up), got '{unknown}'")
+        up = np.array([FLAGS[text] for text in texts])
+        # The last value holds until the end.
+        starts, ends = times[up, 0], np.append(times[1:, 0], max(duration_s, times[-1, 0] + 1))[up]
+    return [
+        Hold(max(0.0, float(start)), min(duration_s, float(end)))
+        for start, end in zip(starts, ends, strict=True)
+        if start < duration_s and end > 0
+    ]
 
 
 # Where the eyes look: lids follow the gaze, and blinks come with large shifts of it.
@@ -389,6 +445,8 @@ def _checked(job: PerformanceJob) -> StateName:
         raise InputError("--blinks-at gives every blink; remove --rate and --lively")
     if job.gaze is not None and job.blinks_at is not None:
         raise InputError("--blinks-at gives every blink, and --gaze brings others; remove one of them")
+    if job.flag is not None and job.blinks_at is not None:
+        raise InputError("--blinks-at gives every blink; remove --blink-while-down")
     if job.state not in get_args(StateName):
         states = list(get_args(StateName))
         raise InputError(f"unknown --state '{job.state}'{did_you_mean(job.state, states)}")

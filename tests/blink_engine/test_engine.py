@@ -18,6 +18,7 @@ from blink_engine import (
     BlinkEngine,
     BlinkShape,
     Event,
+    Hold,
     Law,
     StateChange,
     StateName,
@@ -45,6 +46,7 @@ def test_the_shared_vectors_are_what_the_engine_gives() -> None:
     for one, other in zip(stored["performances"], fresh["performances"], strict=True):
         assert one["causes"] == other["causes"]
         np.testing.assert_allclose(one["left"], other["left"], atol=2e-9)
+    np.testing.assert_allclose(stored["held"]["left"], fresh["held"]["left"], atol=2e-9)
     np.testing.assert_allclose(stored["frames"]["frames"], fresh["frames"]["frames"], atol=1e-12)
 
 
@@ -91,6 +93,40 @@ def test_the_first_seconds_hold_no_more_blinks_than_any_others(law: Law) -> None
     chosen = default_parameters().with_intervals({"rest": law}).with_rate("rest", 17.0)
     blinks = [len(perform(10, 1, seed=seed, parameters=chosen).blinks) for seed in range(3000)]
     assert np.mean(blinks) * 6 == pytest.approx(17.0, rel=0.04)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_eyes_stay_open_during_holds(seed: int) -> None:
+    holds = [Hold(40, 45), Hold(10, 20), Hold(18, 25), Hold(45, 50)]
+    done = perform(60, 100, seed=seed, state="speaking", holds=holds)
+    time_s = np.arange(6000) / 100
+    up = ((time_s >= 10) & (time_s <= 25)) | ((time_s >= 40) & (time_s <= 50))
+    resting = done.left.min()
+    assert (done.left[up] == resting).all()
+    assert (done.right[up] == resting).all()
+    # A person who speaks blinks 26 times a minute: one is due in 10 s, and comes as soon as it may.
+    after = [blink.onset_s for blink in done.blinks if 25 <= blink.onset_s < 40 or blink.onset_s >= 50]
+    assert min(after) == pytest.approx(25, abs=2.5)
+    onsets = np.array([blink.onset_s for blink in done.blinks])
+    assert np.diff(onsets).min() > 0.1
+
+
+def test_a_blink_that_was_due_waits_for_the_flag() -> None:
+    asked = [Event("blink", 5.0), Event("blink", 6.0)]
+    never = default_parameters().with_intervals(dict.fromkeys(STATE_NAMES, Law("fixed", 1e6)))
+    single = never.with_profile(double_share=0.0)
+    done = perform(10, 100, events=asked, holds=[Hold(4.0, 7.0)], parameters=single)
+    assert [blink.onset_s for blink in done.blinks] == [7.0]
+    # One that would reach into the hold is left out; in a stream it finishes.
+    assert (
+        perform(10, 100, events=[Event("blink", 3.9)], holds=[Hold(4.0, 7.0)], parameters=single).blinks == ()
+    )
+    engine = BlinkEngine(parameters=single)
+    engine.notify(Event("blink", 3.9))
+    engine.hold_blinks(True, 4.0)
+    assert max(engine.frame(4 + k / 100).left for k in range(100)) > 0.5
+    with pytest.raises(ValueError, match="ends after its start"):
+        perform(10, 100, holds=[Hold(3, 3)])
 
 
 def test_a_rate_can_be_asked_for() -> None:

@@ -67,6 +67,7 @@ def write_inputs(folder: Path) -> None:
     (folder / "dialogue.vtt").write_text(
         "WEBVTT\n\n00:00.500 --> 00:02.000\n<v Anna>Did you see?\n\n00:02.500 --> 00:04.000\n<v Ben>No.\n"
     )
+    (folder / "flag.csv").write_text("time_s,flag\n5,1\n9.5,0\n")
     (folder / "gaze.csv").write_text("time_s,right_deg,up_deg\n0,0,0\n4.9,0,0\n5,30,0\n12,30,-20\n")
     (folder / "lids.toml").write_text(LIDS)
     manuscript = Document()

@@ -69,6 +69,7 @@ class BlinkPlan {
   private answer_s = Infinity;
   private answerCause = "";
   private anticipated = 0;
+  private held = false;
 
   constructor(
     private readonly parameters: Parameters,
@@ -101,9 +102,20 @@ class BlinkPlan {
     this.answer(time_s + Math.max(0, delay), kind);
   }
 
+  hold(): void {
+    this.held = true;
+  }
+
+  /** What was due while blinks were held comes at once, as one blink. */
+  release(time_s: number): void {
+    this.held = false;
+    this.spontaneous_s = Math.max(this.spontaneous_s, time_s);
+    this.answer_s = Math.max(this.answer_s, time_s);
+  }
+
   /** Hands every blink that begins at or before `until_s` to `take`, in order, each once. */
   due(until_s: number, take: (blink: Blink) => void): void {
-    while (Math.min(this.spontaneous_s, this.answer_s) <= until_s) {
+    while (!this.held && Math.min(this.spontaneous_s, this.answer_s) <= until_s) {
       if (this.answer_s <= this.spontaneous_s) this.takeAnswer(take);
       else this.takeSpontaneous(take);
     }
@@ -218,6 +230,16 @@ export class BlinkEngine {
   /** Report an event, in the order of time; one in the past counts as happening at the last frame. */
   notify(event: BlinkEvent): void {
     this.plan.notify({ ...event, time_s: this.reach(event.time_s) });
+  }
+
+  /**
+   * Hold blinks back while a flag of yours is up (true), and blink again once it is down (false). A blink that has begun
+   * finishes; one that was due meanwhile begins when the flag goes down.
+   */
+  holdBlinks(held: boolean, time_s?: number): void {
+    const reached = this.reach(time_s ?? this.time_s);
+    if (held) this.plan.hold();
+    else this.plan.release(reached);
   }
 
   /** The lids at `time_s`, which must not run backwards; gaze below the horizon in degrees, squint 0 to 1. */

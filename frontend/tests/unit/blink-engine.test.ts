@@ -51,6 +51,14 @@ describe("the engine", () => {
     });
   });
 
+  it("holds blinks while a flag is up, as Python does", () => {
+    const engine = new BlinkEngine({ seed: vectors.held.seed, state: vectors.held.state as StateName });
+    vectors.held.left.forEach((expected, k) => {
+      if (k % 70 === 0) engine.holdBlinks(k % 140 === 70, k / 10);
+      expect(engine.frame(k / 10).left).toBeCloseTo(expected, 8);
+    });
+  });
+
   it("refuses a time that runs backwards, and a senseless rate", () => {
     const engine = new BlinkEngine();
     engine.frame(2);

@@ -292,6 +292,55 @@ def test_lids_follow_a_gaze_whose_large_shifts_bring_blinks(tmp_path: Path) -> N
     assert shapes["EyeLookDownRight"][-1] == pytest.approx(30 / 35, abs=1e-4)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time_s,flag\n0,0\n5,1\n12.5,0\n15,down\n18,Up\n",
+        "start_s,end_s\n18,40\n5,9\n8,12.5\n",
+    ],
+)
+def test_blinks_come_while_the_flag_is_down(tmp_path: Path, text: str) -> None:
+    (tmp_path / "flag.csv").write_text(text, encoding="utf-8")
+    options = ["--duration", "20", "--fps", "100", "--rate", "60", "--seed", "3"]
+    free = _blinks(tmp_path, *options)
+    curves = _blinks(tmp_path, *options, "--blink-while-down", str(tmp_path / "flag.csv"))
+    up = np.r_[500:1251, 1800:2000]
+    for name in ("closure_left", "closure_right"):
+        held, unheld = np.array(curves[name]), np.array(free[name])
+        assert (held[up] == 0).all()
+        assert unheld[up].max() > 0.5
+        # Before the flag goes up for the first time, nothing differs.
+        np.testing.assert_array_equal(held[:400], unheld[:400])
+        assert held[1251:1300].max() > 0.3
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "said"),
+    [
+        (
+            "time_s,up\n1,1\n",
+            [],
+            "expected the columns time_s and flag, or start_s and end_s, got time_s, up",
+        ),
+        ("time_s,flag\n1,maybe\n", [], "flag: expected 0 (down) or 1 (up), got 'maybe'"),
+        ("time_s,flag\nsoon,1\n", [], "expected seconds"),
+        ("time_s,flag\n2,1\n1,0\n", [], "expected rising times"),
+        ("time_s,flag\n1,1\nnan,0\n", [], "expected rising times"),
+        ("start_s,end_s\n3,2\n", [], "expected each end_s after its start_s"),
+        ("start_s,end_s\n30,40\n", [], "expected times from 0 to 10 s"),
+        ("time_s,flag\n1,1\n", ["--blinks-at", "given.csv"], "remove --blink-while-down"),
+    ],
+)
+def test_a_flag_that_cannot_be_is_one_line(tmp_path: Path, text: str, options: list[str], said: str) -> None:
+    (tmp_path / "flag.csv").write_text(text, encoding="utf-8")
+    out = tmp_path / "out.csv"
+    arguments = ["performance", "--blink-while-down", str(tmp_path / "flag.csv"), "--duration", "10"]
+    done = CliRunner().invoke(app, [*arguments, "--out", str(out), *options])
+    assert isinstance(done.exception, InputError)
+    assert said in str(done.exception)
+    assert not out.exists()
+
+
 @pytest.mark.parametrize(("noise_deg", "rate_hz"), [(0.1, 500), (0.3, 250), (0.3, 500)])
 def test_noise_of_an_eye_tracker_is_no_gaze_shift(noise_deg: float, rate_hz: int) -> None:
     random = np.random.default_rng(1)
