@@ -143,6 +143,12 @@ _FEATURES: dict[str, Callable[[Clip], Value | None]] = {
     BYTES: lambda clip: float(clip.bytes),
 }  # fmt: skip
 
+LID_ENDS = {
+    f"{end} position of the {_SIGNALS[eye]}"
+    for end in ("first", "last")
+    for eye in ("closure", "closure_other")
+}
+
 
 def _features_of(clips: Sequence[Clip], factor: str) -> set[str]:
     """The features that a factor of rendered clips varies on purpose, because it sets the character or
@@ -154,6 +160,9 @@ def _features_of(clips: Sequence[Clip], factor: str) -> set[str]:
         set_on_purpose |= {SIZE, BYTES, *BRIGHTNESS}
     if _sets(clips, factor, lambda clip: clip.fps):
         set_on_purpose |= {RATE, LENGTH, ONSET, BYTES}
+    # With them the lids rest lower, to have room above.
+    if _sets(clips, factor, lambda clip: (clip.inputs.get("anticipation"), clip.inputs.get("settle"))):
+        set_on_purpose |= LID_ENDS
     if _sets(clips, factor, lambda clip: clip.duration_frames):
         set_on_purpose |= {LENGTH, BYTES}
     return set_on_purpose

@@ -86,6 +86,12 @@ class RenderSettings(Declaration):
     life: Strength = 0.0
     """Motion between blinks: head sway, breathing, gaze, pupil and sensor noise. 0 is none, 1 as much as in
     recordings of people. The lids follow the gaze; blinks stay as they are."""
+    anticipation: Strength = 0.0
+    """Animators' anticipation: the lids lift before the blink, by 8% of the opening at 1. To have room for
+    it, they rest as much lower. Not used in a performance."""
+    settle: Strength = 0.0
+    """Animators' settle: the lids open beyond their rest after the blink, by 8% of the opening at 1, and
+    sink back within 0.3 s; otherwise like `anticipation`."""
     eyes: Literal["alike", "separate"] = "alike"
     """`alike`: one signal drives both eyes. `separate`: the left and right recordings each drive one eye."""
     performance: Timing | None = None
@@ -177,6 +183,10 @@ class RenderOverrides(Declaration):
     """As [render] `gaze_mm`, for clips of this level."""
     life: Strength | None = None
     """As [render] `life`, for clips of this level."""
+    anticipation: Strength | None = None
+    """As [render] `anticipation`, for clips of this level."""
+    settle: Strength | None = None
+    """As [render] `settle`, for clips of this level."""
     eyes: Literal["alike", "separate"] | None = None
     """As [render] `eyes`, for clips of this level."""
     performance: Timing | None = None

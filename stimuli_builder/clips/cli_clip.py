@@ -77,6 +77,12 @@ def clip_command(
     life: Annotated[
         float, typer.Option(min=0, max=1, help="Motion between blinks: 0 none, 1 as in recordings of people.")
     ] = 0.0,
+    anticipation: Annotated[
+        float, typer.Option(min=0, max=1, help="How far the lids lift before the blink: 1 is 8%.")
+    ] = 0.0,
+    settle: Annotated[
+        float, typer.Option(min=0, max=1, help="How far they open beyond their rest after it: 1 is 8%.")
+    ] = 0.0,
     eyes: Annotated[
         Eyes, typer.Option(help="One signal for both eyes, or the recorded left and right eye.")
     ] = "alike",
@@ -107,6 +113,8 @@ def clip_command(
         squint_mm=squint_mm,
         gaze_mm=gaze_mm,
         life=life,
+        anticipation=anticipation,
+        settle=settle,
         eyes=eyes,
         fps=fps,
         width_px=width,

@@ -219,6 +219,48 @@ def clip_curve(
     )
 
 
+ANTICIPATION_S, SETTLE_S = 0.13, 0.3
+"""An animator draws four frames of anticipation at 30 fps, and nine in which a lid settles."""
+OVERSHOOT = 0.08
+"""How far beyond their rest the lids lift at strength 1, as a share of the opening."""
+
+
+def with_overshoot(curve: ClipCurve, anticipation: float, settle: float) -> ClipCurve:
+    """The curve of a single blink whose lids lift before it, and settle after it; itself at 0.
+
+    No picture shows an eye wider than open, so the lids rest lower by what they lift. The blink itself goes
+    on as before: it closes what is open at each moment.
+
+    Parameters
+    ----------
+    anticipation, settle : float
+        Strengths from 0 to 1.
+    """
+    if not anticipation and not settle:
+        return curve
+    rest = OVERSHOOT * max(anticipation, settle)
+    before, after = rest - OVERSHOOT * anticipation, rest - OVERSHOOT * settle
+    shut = int(curve.closure.argmax())
+    # After the peak, whatever a profile's stated length: times must rise.
+    end = max(shut + 1, curve.onset_sample + round(curve.duration_frames * PROFILE_FPS / 30))
+    lift = curve.onset_sample - ANTICIPATION_S * PROFILE_FPS
+    # While the eye is shut, its resting place passes unseen from the one to the other.
+    times = np.array([lift, curve.onset_sample, shut, end, end + SETTLE_S * PROFILE_FPS])
+    places = np.array([rest, before, before, after, rest])
+    sample = np.arange(len(curve.closure), dtype=np.float64)
+    part = np.clip(np.searchsorted(times, sample, side="right") - 1, 0, len(times) - 2)
+    done = np.clip((sample - times[part]) / (times[part + 1] - times[part]), 0.0, 1.0)
+    # Smooth at both ends of each part: the minimum-jerk course.
+    eased = done**3 * (10.0 + done * (6.0 * done - 15.0))
+    resting = places[part] + (places[part + 1] - places[part]) * eased
+
+    def over(closure: Array) -> Array:
+        return np.asarray(np.round(resting + (1.0 - resting) * closure, DECIMALS))
+
+    other = curve.closure_other
+    return replace(curve, closure=over(curve.closure), closure_other=None if other is None else over(other))
+
+
 def with_lower_lid_gain(curve: ClipCurve, gain: float) -> ClipCurve:
     """The curve with the lower lid's lift and slide times `gain`; itself at 1."""
     if gain == 1.0 or curve.lower_vertical_mm is None or curve.lower_horizontal_mm is None:
@@ -233,10 +275,12 @@ def with_lower_lid_gain(curve: ClipCurve, gain: float) -> ClipCurve:
 def shown_by(
     curve: ClipCurve, settings: RenderSettings, reach: Reach | None
 ) -> tuple[ClipCurve, dict[str, str]]:
-    """The curve as a character shows it: the lower lid with the gain of the settings, checked for reach.
+    """The curve as a character shows it: with overshoot and the lower lid's gain, checked for reach.
 
     Returns and raises as `within_reach` does.
     """
+    if settings.performance is None:
+        curve = with_overshoot(curve, settings.anticipation, settings.settle)
     return within_reach(with_lower_lid_gain(curve, settings.lower_lid_gain), reach)
 
 

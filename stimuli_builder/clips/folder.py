@@ -264,6 +264,11 @@ def _clip(clip: PlannedClip, state: BuildState, seed: int) -> Clip:
             **job.look.movement.inputs(),
             # Without motion the key is left out, as in manifests from before it existed.
             **({"life": repr(settings.life), "life_seed": str(job.life_seed)} if settings.life else {}),
+            **{
+                name: repr(value)
+                for name in ("anticipation", "settle")
+                if (value := getattr(settings, name)) and not settings.performance
+            },
             "eyes": settings.eyes,
             **clip.lower_held,
             "encoder": job.look.encoder,

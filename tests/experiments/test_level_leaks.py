@@ -153,3 +153,12 @@ def test_the_statistic_and_its_tail_are_those_of_scipy() -> None:
     for df in (1, 2, 4, 12, 40):
         for p in (0.05, 0.01, 0.001):
             assert chi_square_tail(float(chi2.isf(p, df)), df) == pytest.approx(p, rel=1e-9)
+
+
+def test_lids_that_rest_lower_for_their_settle_are_set_on_purpose() -> None:
+    drawn = {"character": "cartoon"}
+    plain: dict[str, object] = {"closure": (0.0, 0.0), "inputs": drawn}
+    settling: dict[str, object] = {"closure": (0.08, 0.08), "inputs": drawn | {"settle": "1.0"}}
+    assert reported_leaks(clips_with(plain=[plain] * 12, settling=[settling] * 12)) == []
+    undeclared = settling | {"inputs": drawn}
+    assert reported_leaks(clips_with(plain=[plain] * 12, settling=[undeclared] * 12)) != []

@@ -1479,6 +1479,8 @@ export interface components {
    *       "lower_lid": "none",
    *       "lower_lid_gain": 1,
    *       "life": 0,
+   *       "anticipation": 0,
+   *       "settle": 0,
    *       "eyes": "alike",
    *       "seconds": 20,
    *       "state": "listening",
@@ -2687,6 +2689,8 @@ export interface components {
    squint_mm: number | null;
    gaze_mm: number | null;
    life: number | null;
+   anticipation: number | null;
+   settle: number | null;
    eyes: ("alike" | "separate") | null;
    performance: ("uniform" | "intervals" | "events" | "none") | null;
    seconds: number | null;
@@ -2726,6 +2730,10 @@ export interface components {
    gaze_mm: number | null;
    /** @default 0 */
    life: number;
+   /** @default 0 */
+   anticipation: number;
+   /** @default 0 */
+   settle: number;
    /**
    * @default alike
    * @enum {string}

@@ -16,6 +16,7 @@ from stimuli_builder.clips.curves import (
     amplitude_of,
     clip_curve,
     frame_weights,
+    with_overshoot,
     within_reach,
 )
 from stimuli_builder.clips.design_clips import Options, planned_clips
@@ -67,6 +68,35 @@ def test_lower_lid_modes_move_what_they_say(mode: str, moves: tuple[bool, bool])
 
 def test_a_lower_lid_at_rest_has_no_signal() -> None:
     assert clip_curve(BLINK, Timing(10, 10, 0, 30), "none").lower_vertical_mm is None
+
+
+@pytest.mark.parametrize("amplitude", ["full", "natural"])
+@pytest.mark.parametrize(("anticipation", "settle"), [(1.0, 0.0), (0.0, 1.0), (1.0, 0.5), (0.25, 1.0)])
+def test_lids_lift_before_a_blink_and_settle_after_it(
+    amplitude: str, anticipation: float, settle: float
+) -> None:
+    profile = amplitude_of(textbook_profile("AL", 9), amplitude)
+    plain = clip_curve(profile, Timing(15, 15, 4, 30), "none")
+    curve = with_overshoot(plain, anticipation, settle)
+    rest = 0.08 * max(anticipation, settle)
+    onset, end = plain.onset_sample, plain.onset_sample + 90
+    # It rests lower, lifts in the 39 samples before the blink, and sinks back in the 90 after it.
+    assert curve.closure[0] == curve.closure[onset - 39] == curve.closure[-1] == pytest.approx(rest)
+    assert curve.closure[onset] == pytest.approx(rest - 0.08 * anticipation, abs=1e-6)
+    assert curve.closure[end] == pytest.approx(rest - 0.08 * settle, abs=2e-3)
+    assert curve.closure[end + 90] == pytest.approx(rest)
+    shut = int(plain.closure.argmax())
+    assert curve.closure.argmax() == shut
+    if amplitude == "full":
+        assert curve.closure[shut] == 1.0
+    # No jump: a lid never moves faster than in the blink itself.
+    assert np.abs(np.diff(curve.closure)).max() <= np.abs(np.diff(plain.closure)).max() + 1e-6
+    assert curve.onset_sample == plain.onset_sample
+
+
+def test_without_anticipation_and_settle_a_curve_is_itself() -> None:
+    plain = clip_curve(BLINK, Timing(10, 10, 0, 30), "none")
+    assert with_overshoot(plain, 0.0, 0.0) is plain
 
 
 @pytest.mark.parametrize("wrong", [-0.1, 1.2, float("nan"), float("inf")])
