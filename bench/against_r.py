@@ -11,7 +11,8 @@ BayesFactor, lmerTest, ordinal, BradleyTerry2, psyphy, psych, psychotools, mlmRe
 
 speed: mixed and ordinal models and the ANOVA against R's own calls. Prints CPU seconds of both, their ratio
 (above 1: faster than R) and how much the likelihoods differ. lmer fits without tests; ours with
-Satterthwaite's. Needs Rscript with afex, lme4, lmerTest, ordinal and jsonlite.
+Satterthwaite's. The last row is the whole program, from its start to the same tables (`whole_anova.R`).
+Needs Rscript with afex, effectsize, lme4, lmerTest, ordinal and jsonlite.
 
 ordinal: Laplace's likelihood by its definition, in 80-bit floats. FOLDER holds what `unseen_models.R`
 wrote; NAME is a model of it with one random intercept, such as Socatt. Nothing of `analysis.models` but the
@@ -22,6 +23,7 @@ a Newton step moves any threshold (relative), and its gain.
 import json
 import math
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -47,6 +49,9 @@ from bench.harness import cpu_times_s, run_part
 SCRIPTS = Path(__file__).parent / "r"
 Number = tuple[str, float | None, float | None]
 """What, ours, R's."""
+
+ANALYSIS = Path(sys.executable).with_name("analysis")
+PROGRAM_RUNS = 7
 
 NEAR_ZERO = 1e-11
 """Differences below this, of the largest mean where means are compared, are rounding."""
@@ -313,6 +318,29 @@ def compare_speed() -> None:
             theirs = times[model.removesuffix("+")]
             ratio, apart = theirs["cpu"] / seconds, value - theirs["value"]
             sys.stdout.write(f"{model:10} {theirs['cpu']:8.3f} {seconds:8.4f} {ratio:7.1f} {apart:15.6f}\n")
+        theirs_s, seconds = whole_programs(r, Path(name) / "cells.csv")
+        sys.stdout.write(f"{'program':10} {theirs_s:8.3f} {seconds:8.4f} {theirs_s / seconds:7.1f}\n")
+
+
+def whole_programs(r: str, table: Path) -> tuple[float, float]:
+    """Median CPU seconds of R's whole program and of `analysis anova`, run in turn on 26 people's ratings."""
+    draws = np.random.default_rng(1)
+    rows = pd.MultiIndex.from_product(
+        [range(26), [*"pqr"], [*"xyz"], range(5)], names=["id", "face", "speed", "n"]
+    )
+    rating = 4 + np.repeat(draws.normal(size=26), 45) + (rows.get_level_values("face") == "q")
+    noisy = np.clip(np.round(rating + draws.normal(size=len(rows))), 1, 7)
+    pd.DataFrame({"score": noisy}, index=rows).to_csv(table)
+    asked = ["anova", str(table), "--participant", "id", "--rating", "score", "--within", "face,speed"]
+    programs = ([r, "--vanilla", str(SCRIPTS / "whole_anova.R"), str(table)], [str(ANALYSIS), *asked])
+    spent: tuple[list[float], list[float]] = ([], [])
+    for _ in range(PROGRAM_RUNS):
+        for program, seconds in zip(programs, spent, strict=True):
+            before = resource.getrusage(resource.RUSAGE_CHILDREN)
+            subprocess.run(program, check=True, capture_output=True)
+            after = resource.getrusage(resource.RUSAGE_CHILDREN)
+            seconds.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return float(np.median(spent[0])), float(np.median(spent[1]))
 
 
 Real = np.longdouble

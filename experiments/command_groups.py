@@ -164,7 +164,7 @@ def command_group(
 # A command line that lists its commands without importing them: each is loaded when it is called.
 
 Commands = Mapping[str, tuple[str, str]]
-"""Command -> the module whose `register` adds it, and its line of help in the list."""
+"""Command -> the module whose `register` adds it, and its line of help in the list (hidden where empty)."""
 
 
 def lazy_group(commands: Commands) -> type[WholeLineGroup]:
@@ -176,7 +176,9 @@ def lazy_group(commands: Commands) -> type[WholeLineGroup]:
         def __init__(self, **settings: Any):
             super().__init__(**settings)
             self._unloaded = set(commands)
-            self.commands = {name: TyperCommand(name, help=line) for name, (_, line) in commands.items()}
+            self.commands = {
+                name: TyperCommand(name, help=line, hidden=not line) for name, (_, line) in commands.items()
+            }
 
         def resolve_command(self, ctx: Any, args: list[str]) -> Any:
             """Load the module of the command that is called."""

@@ -85,6 +85,8 @@ def run_command_line(app: Callable[..., object]) -> None:
 
     Bad input, a wrong call and a full disk are one line on stderr, with exit code 2.
     """
+    # Looking for plugins of pydantic reads the metadata of every installed package; there are none.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         code = app(standalone_mode=False)
     except InputError as error:

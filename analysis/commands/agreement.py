@@ -38,10 +38,11 @@ class LevelChoice(StrEnum):
     RATIO = "ratio"
 
 
-def register_agreement(app: typer.Typer) -> None:
+def register(app: typer.Typer) -> None:
     """Add the commands to `app`."""
     app.command(name="reliability")(reliability)
     app.command(name="agreement")(agreement)
+    app.command(name="opinion")(opinion)
 
 
 def reliability(
@@ -160,11 +161,6 @@ class RepeatsChoice(StrEnum):
 
     MEAN = "mean"
     VOTES = "votes"
-
-
-def register_opinion(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command(name="opinion")(opinion)
 
 
 def opinion(

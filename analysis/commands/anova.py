@@ -22,7 +22,7 @@ from experiments.errors import InputError
 from experiments.files import check_folder
 
 
-def register_anova(app: typer.Typer) -> None:
+def register(app: typer.Typer) -> None:
     """Add the command to `app`."""
     app.command(name="anova")(anova)
 

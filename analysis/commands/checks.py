@@ -26,9 +26,11 @@ if TYPE_CHECKING:
 # `analysis check-paper`: what printed figures and sentences say about themselves.
 
 
-def register_check_paper(app: typer.Typer) -> None:
-    """Add the command to `app`."""
+def register(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
     app.command(name="check-paper")(check_paper)
+    app.command(name="verify")(verify)
+    app.command(name="replicate")(replicate)
 
 
 def check_paper(
@@ -120,11 +122,6 @@ def _check_figures(figures: Path, json: Path | None) -> int:
 # `analysis verify`: is a capsule whole, and does its report come out again?
 
 
-def register_verify(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command(name="verify")(verify)
-
-
 def verify(
     capsule: Annotated[
         Path, typer.Argument(help="The zip of a capsule, or the folder it was unpacked into.")
@@ -207,11 +204,6 @@ def _tell(compared: "list[FileComparison]", versions: list[str]) -> None:
 
 
 # `analysis replicate`: published studies rebuilt from their raw files.
-
-
-def register_replicate(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command(name="replicate")(replicate)
 
 
 def replicate(

@@ -66,9 +66,10 @@ class PriorChoice(StrEnum):
     NONE = "none"
 
 
-def register_pairs(app: typer.Typer) -> None:
-    """Add the command to `app`."""
+def register(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
     app.command(name="pairs")(pairs)
+    app.command(name="thresholds")(thresholds)
 
 
 def pairs(
@@ -346,11 +347,6 @@ class FunctionChoice(StrEnum):
     NORMAL = "normal"
     LOGISTIC = "logistic"
     WEIBULL = "weibull"
-
-
-def register_thresholds(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command(name="thresholds")(thresholds)
 
 
 def thresholds(

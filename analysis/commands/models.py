@@ -147,13 +147,10 @@ class OrdinalSlopesChoice(StrEnum):
     NONE = "none"
 
 
-def register_models(app: typer.Typer) -> None:
-    """Add the commands to `app`, those on synthetic participants too."""
-    from analysis.commands.synthetic import register_synthetic
-
+def register(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
     app.command(name="mixed")(mixed)
     app.command(name="ordinal")(ordinal)
-    register_synthetic(app)
 
 
 def mixed(

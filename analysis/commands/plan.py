@@ -220,8 +220,8 @@ plan = command_group(
 )
 
 
-def register_plan(app: typer.Typer) -> None:
-    """Add the commands to `app`."""
+def register(app: typer.Typer) -> None:
+    """Add the command to `app`."""
     plan.command(name="pairs")(pairs)
     plan.command(name="thresholds")(thresholds)
     app.add_typer(plan)

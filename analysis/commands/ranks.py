@@ -67,7 +67,7 @@ class _Levels:
     synthetic: bool
 
 
-def register_ranks(app: typer.Typer) -> None:
+def register(app: typer.Typer) -> None:
     """Add the commands to `app`."""
     app.command(name="ranks")(ranks)
     app.command(name="t-test")(t_test)

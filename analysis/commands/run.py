@@ -30,7 +30,7 @@ class Origin(StrEnum):
     ALL = "all"
 
 
-def register_run(app: typer.Typer) -> None:
+def register(app: typer.Typer) -> None:
     """Add the command to `app`."""
     app.command(name="run")(run)
 

@@ -44,7 +44,7 @@ class StatisticChoice(StrEnum):
     GREENHOUSE_GEISSER = "greenhouse-geisser"
 
 
-def register_synthetic(app: typer.Typer) -> None:
+def register(app: typer.Typer) -> None:
     """Add the commands to `app`."""
     app.command(name="power")(power)
     app.command(name="synthesise")(synthesise_command)

@@ -25,9 +25,12 @@ MAX_LISTED = 20
 # `analysis convert`: a CSV whose columns are declared, as SPSS or Parquet.
 
 
-def register_convert(app: typer.Typer) -> None:
-    """Add the command to `app`."""
+def register(app: typer.Typer) -> None:
+    """Add the commands to `app`."""
     app.command(name="convert")(convert)
+    app.command(name="reshape")(reshape)
+    app.command(name="columns")(columns)
+    app.command(name="page", hidden=True)(page)
 
 
 def convert(
@@ -60,11 +63,6 @@ def convert(
 
 
 # `analysis reshape`: a wide table made long.
-
-
-def register_reshape(app: typer.Typer) -> None:
-    """Add the command to `app`."""
-    app.command(name="reshape")(reshape)
 
 
 def reshape(
@@ -107,12 +105,6 @@ def reshape(
 
 
 # `analysis columns`: what a table may be, and the command that fits it.
-
-
-def register_columns(app: typer.Typer) -> None:
-    """Add the commands to `app`."""
-    app.command(name="columns")(columns)
-    app.command(name="page", hidden=True)(page)
 
 
 def columns(

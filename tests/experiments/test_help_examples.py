@@ -1,8 +1,10 @@
-"""Examples in `--help` are lines that a shell takes as they are printed."""
+"""The help of each program: examples that a shell takes as printed, and a list that imports no library."""
 
 import inspect
 import re
 import shlex
+import subprocess
+import sys
 from importlib import import_module
 
 import pytest
@@ -13,13 +15,31 @@ from experiments.command_groups import broken, commands_of, whole_examples
 PROGRAMS = ("stimuli", "server", "analysis")
 MODULES = {"stimuli": "stimuli_builder.cli", "server": "server.cli", "analysis": "analysis.cli"}
 WIDTH = 78
+HEAVY = (
+    *("numpy", "scipy", "pandas", "av", "cv2", "matplotlib", "numba", "skia", "pydantic"),
+    *("sqlalchemy", "fastapi", "authlib", "httpx", "uvicorn", "alembic", "server.core.settings"),
+)
+HELP = """
+import sys
+from {module} import main
+sys.argv = ["{program}", "--help"]
+try:
+    main()
+finally:
+    sys.stderr.write(" ".join(name for name in {heavy} if name in sys.modules))
+"""
+
+
+def listed_by(program):
+    """The commands that a program lists, each with its module and its line of help."""
+    return import_module(MODULES[program]).COMMANDS
 
 
 def commands(program):
     """Every command of a program with its path, groups included."""
     module = import_module(MODULES[program])
     root = typer.main.get_command(module.app)
-    for name in {name for name, _ in getattr(module, "COMMANDS", {}).values()}:
+    for name in {name for name, _ in module.COMMANDS.values()}:
         root.commands.update(commands_of(name))
     waiting = [(program, root)]
     while waiting:
@@ -47,6 +67,29 @@ def test_every_example_can_be_pasted(program, monkeypatch):
         for line in printed.partition("\nOptions:")[0].splitlines()[1:]:
             assert len(line) <= WIDTH, f"{path}: {line}"
     assert seen > 10
+
+
+@pytest.mark.parametrize(
+    ("program", "module"),
+    [(name, one) for name in PROGRAMS for one in sorted({home for home, _ in listed_by(name).values()})],
+)
+def test_every_line_of_help_is_the_one_of_the_command_itself(program, module):
+    lines = {
+        name: "" if command.hidden else " ".join((command.help or "").strip().split("\n\n")[0].split())
+        for name, command in commands_of(module).items()
+    }
+    assert lines == {name: line for name, (home, line) in listed_by(program).items() if home == module}
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_help_lists_every_command_and_imports_none_of_their_libraries(program):
+    asked = HELP.format(program=program, module=MODULES[program], heavy=HEAVY)
+    ended = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert ended.stderr == ""
+    section = ended.stdout.split("Commands:\n")[1]
+    listed = [line.split(maxsplit=1)[0] for line in section.splitlines() if line[2:3].strip()]
+    assert listed == [name for name, (_, line) in listed_by(program).items() if line]
+    assert "..." not in section  # every line whole
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

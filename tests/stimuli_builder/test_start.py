@@ -35,3 +35,12 @@ def test_help_needs_no_numerics(command: str) -> None:
 
 def test_help_of_baking_needs_no_compiler() -> None:
     assert not loaded("bake", "--help") & {"numba", "skia"}
+
+
+def test_an_unknown_command_is_reported_with_the_nearest_one(monkeypatch, capsys):
+    from stimuli_builder.cli import main
+
+    monkeypatch.setattr(sys, "argv", ["stimuli", "blink"])
+    with pytest.raises(SystemExit):
+        main()
+    assert "blinks" in capsys.readouterr().err
