@@ -1,7 +1,7 @@
 /** A VRM avatar that blinks by the engine: choose a .vrm file, or drop it onto the page. */
 import "./page.css";
 import { type VRM, VRMLoaderPlugin } from "@pixiv/three-vrm";
-import { AmbientLight, Box3, DirectionalLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { Box3, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { BlinkEngine } from "../../blink-engine";
 import { sampleHead } from "./sample-head";
@@ -10,9 +10,12 @@ const loader = new GLTFLoader();
 loader.register((parser) => new VRMLoaderPlugin(parser));
 
 const scene = new Scene();
-const sun = new DirectionalLight(0xffffff, 2.5);
-sun.position.set(0.5, 1, 2);
-scene.add(sun, new AmbientLight(0xffffff, 1));
+/** A warm light in front, a cool one from behind, and light from all around. */
+const key = new DirectionalLight(0xfff2e6, 2.4);
+key.position.set(-0.6, 0.8, 1.6);
+const edge = new DirectionalLight(0xdfe8ff, 1.2);
+edge.position.set(1.2, 0.6, -0.6);
+scene.add(key, edge, new HemisphereLight(0xffffff, 0x9a8478, 1.5));
 const camera = new PerspectiveCamera(30, 4 / 3, 0.01, 100);
 const engine = new BlinkEngine({ seed: 1, state: "listening" });
 let avatar: VRM | null = null;
@@ -41,7 +44,7 @@ function blink(vrm: VRM, time_s: number): void {
 function start(canvas: HTMLCanvasElement, said: HTMLElement, chooser: HTMLInputElement | null): void {
   const renderer = new WebGLRenderer({ canvas, antialias: true });
   renderer.setSize(640, 480, false);
-  renderer.setClearColor(0x808080);
+  renderer.setClearColor(0xb9c2c8);
   const begun = performance.now();
   const tick = (now: number): void => {
     const time_s = Math.max(0, now - begun) / 1000;
