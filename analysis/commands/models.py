@@ -307,7 +307,7 @@ def ordinal(
 
       analysis ordinal ratings.csv --means --likelihood-ratio
 
-      analysis ordinal table.csv --formula 'score ~ face + age + (1 | id) + (1 | clip)'
+      analysis ordinal table.csv --formula 'score ~ face + age + (1 + face || id) + (1 + age || clip)'
     """
     _refuse_format(residuals)
     from analysis.models.ordinal import fit_ordinal
@@ -333,8 +333,6 @@ def ordinal(
     if model.random:
         more = ", ".join(model.random)
         raise InputError(f"the ordinal model has participants and one more grouping; remove {more}")
-    for grouping, _ in model.group_slopes:
-        raise InputError(f"the ordinal model has slopes of participants only; write (1 | {grouping})")
     clips = data.item if quadrature in (None, 1) or model.item else ()
     with progress_spinner("fitting"):
         result = fit_ordinal(
@@ -349,6 +347,8 @@ def ordinal(
             quadrature,
             effects=model.effects,
             slope_effects=model.slope_effects,
+            # A formula for this model names one grouping besides the participants.
+            item_slopes=next((effects for _, effects in model.group_slopes), ()),
             means=means,
             likelihood_ratio=likelihood_ratio,
             residuals=residuals is not None,

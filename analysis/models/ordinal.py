@@ -11,7 +11,7 @@ from scipy import optimize, special
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.models.columns import ModelTerms, Slopes, split_covariates
-from analysis.models.design import ModelData, model_data, slope_groups, unmodelled_slopes
+from analysis.models.design import ModelData, model_data, refuse_group_slopes, slope_groups, unmodelled_slopes
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
 from analysis.models.means import Estimate, ModelMeans, RatioTest, model_means, ratio_tests
 from analysis.models.ordinal_maximum import (
@@ -100,10 +100,11 @@ class OrdinalResult:
 
 @dataclass(frozen=True)
 class RandomTerms:
-    """The effects that differ between participants."""
+    """The effects that differ between participants, and those that differ between items."""
 
     slopes: Slopes
     groups: tuple[str, ...]
+    of_items: tuple[str, ...]
 
 
 def ordinal_result(
@@ -120,6 +121,7 @@ def ordinal_result(
     # `Maximum.covariance` is of thresholds, then coefficients, then SDs.
     block = maximum.covariance[first : -len(p.sd), first : -len(p.sd)]
     components = _components(p, terms, data)
+    of_items = [component.sd for component in components[len(terms.groups) :]]
     parameters = first + len(p.beta) + len(components)
     return OrdinalResult(
         formula=_formula(data, terms),
@@ -130,7 +132,7 @@ def ordinal_result(
         coefficients=_coefficients(data, p.beta, block),
         effects=_effects(data, p.beta, block),
         sd_participant=components[0].sd,
-        sd_item=components[-1].sd if data.items else 0.0,
+        sd_item=of_items[0] if of_items else 0.0,
         slopes=terms.slopes,
         components=components,
         singular=any(component.sd == 0 for component in components),
@@ -172,31 +174,38 @@ def _search_notes(maximum: Maximum) -> tuple[str, ...]:
 
 def _sd_notes(p: Parameters, terms: RandomTerms, data: ModelData) -> list[str]:
     names = ["participants", *(f"participants' slopes of {group}" for group in terms.groups[1:])]
-    names += ["items"] * (data.items is not None)
+    names += ["items", *(f"items' slopes of {group}" for group in terms.of_items[1:])]
     zero = "the SD of {} is estimated as zero"
     limit = "the SD of {} is at its upper limit of {:.1f}: the ratings hardly determine it or the estimates"
     return [
         zero.format(name) if sd == 0 else limit.format(name, SD_MAX)
-        for name, sd in zip(names, p.sd, strict=False)
+        for name, sd in zip(names, p.sd if data.items else p.sd[:-1], strict=data.items is not None)
         if sd == 0 or sd > SD_MAX - 1e-6
     ]
 
 
 def _components(p: Parameters, terms: RandomTerms, data: ModelData) -> tuple[OrdinalComponent, ...]:
-    components = [
-        OrdinalComponent(data.terms.participant, group, float(sd) / data.unit(group))
-        for group, sd in zip(terms.groups, p.sd[:-1], strict=True)
-    ]
-    if data.items is not None:
-        components.append(OrdinalComponent(data.items.name, "intercept", float(p.sd[-1])))
-    return tuple(components)
+    names = _component_names(data, terms.groups, terms.of_items)
+    return tuple(
+        OrdinalComponent(group, effect, float(sd) / data.unit(effect))
+        for (group, effect), sd in zip(names, p.sd, strict=False)
+    )
+
+
+def _component_names(
+    data: ModelData, groups: Sequence[str], of_items: Sequence[str]
+) -> list[tuple[str, str]]:
+    """Grouping and effect of each SD, in their order; without items their SD has no name."""
+    people = [(data.terms.participant, effect) for effect in groups]
+    return people + ([(data.items.name, effect) for effect in of_items] if data.items else [])
 
 
 def _formula(data: ModelData, terms: RandomTerms) -> str:
-    participant = data.terms.participant
-    slopes = "".join(f" + (0 + {group} | {participant})" for group in terms.groups[1:])
-    items = f" + (1 | {data.items.name})" if data.items else ""
-    return f"{data.terms.rating} ~ {data.fixed_part} + (1 | {participant}){slopes}{items}, logit"
+    parts = [
+        f" + ({'1' if effect == 'intercept' else f'0 + {effect}'} | {group})"
+        for group, effect in _component_names(data, terms.groups, terms.of_items)
+    ]
+    return f"{data.terms.rating} ~ {data.fixed_part}{''.join(parts)}, logit"
 
 
 # Ratings that a factor separates: no finite coefficient has the highest likelihood.
@@ -286,11 +295,13 @@ def fit_ordinal(
     equivalence: tuple[float, float] | None = None,
     effects: Sequence[str] | None = None,
     slope_effects: Sequence[str] = (),
+    item_slopes: Sequence[str] = (),
 ) -> OrdinalResult:
     """Fit ordered ratings ~ full factorial of the factors + covariates with crossed random effects.
 
     Parameters are those of `analysis.models.mixed.fit_mixed`; slopes of one effect share one variance over
-    its orthonormal contrasts and do not correlate. Categories are the distinct ratings met, in order; a
+    its orthonormal contrasts and do not correlate; so do those of `item_slopes`, the effects that differ
+    between items. Categories are the distinct ratings met, in order; a
     rating of the scale that nobody gave has no separate threshold. A model without items and slopes is
     fitted by adaptive Gauss-Hermite quadrature of each participant's integral, with as many nodes as more
     would change nothing; others by Laplace's approximation, with a note where it is not accurate. With
@@ -318,8 +329,11 @@ def fit_ordinal(
         interactions=interactions,
         effects=None if effects is None else tuple(effects),
         slope_effects=tuple(slope_effects) or None,
+        group_slopes=((":".join(items), tuple(item_slopes)),) if items and item_slopes else (),
     )
     data = model_data(rows, columns)
+    refuse_group_slopes(data)
+    of_items = ["intercept"] if data.items is None else data.group_effects(data.items, "none")
     categories, codes = np.unique(data.rating, return_inverse=True)
     if len(categories) > MAXIMUM_CATEGORIES:
         raise InputError(
@@ -329,7 +343,7 @@ def fit_ordinal(
     refuse_separation(data)
     groups, left_out = slope_groups(data, slopes)
     left_out += unmodelled_slopes(data, slopes)
-    ordinal = _ordinal_data(data, codes.astype(np.int64), len(categories), groups)
+    ordinal = _ordinal_data(data, codes.astype(np.int64), len(categories), groups, of_items)
     # matrices this small only wait for a second thread
     with threadpool_limits(1, "blas"):
         maximum = maximise(LaplaceLikelihood(ordinal), pooled_start(ordinal, bool(items)), bool(items))
@@ -343,8 +357,8 @@ def fit_ordinal(
         first = len(categories) - 1
         _refuse_undetermined(data, np.diag(maximum.covariance)[first : -ordinal.n_sds])
         if quadrature is None and not one_integral:
-            left_out += _laplace_notes(data, ordinal, maximum, groups)
-    terms = RandomTerms(slopes, tuple(groups))
+            left_out += _laplace_notes(data, ordinal, maximum, _component_names(data, groups, of_items))
+    terms = RandomTerms(slopes, tuple(groups), tuple(of_items))
     result = ordinal_result(data, categories, maximum, terms, left_out, nodes)
     if means:
         result = replace(result, means=_latent_means(data, maximum, equivalence))
@@ -405,7 +419,7 @@ def _by_enough_nodes(ordinal: OrdinalData, start: Maximum) -> tuple[Maximum, int
 
 
 def _laplace_notes(
-    data: ModelData, ordinal: OrdinalData, maximum: Maximum, groups: Sequence[str]
+    data: ModelData, ordinal: OrdinalData, maximum: Maximum, components: Sequence[tuple[str, str]]
 ) -> list[str]:
     """What exact integrals would move too far, of a model that only Laplace's approximation fits."""
     step = laplace_step(ordinal, maximum, data.items is not None)
@@ -418,8 +432,10 @@ def _laplace_notes(
             moved.append(
                 f"{name} by {'about ' + size if abs(by) < error else 'more than its standard error'}"
             )
-    names = [f"{data.terms.participant} {group}" for group in groups]
-    names += [data.items.name] if data.items else []
+    names = [
+        group if effect == "intercept" and group != data.terms.participant else f"{group} {effect}"
+        for group, effect in components
+    ]
     for name, by, sd in zip(names, step[-ordinal.n_sds :], maximum.parameters.sd, strict=False):
         if sd > 0 and abs(by) > OFF_SD * sd:
             size = f"about {100 * by / sd:+.0f}%" if abs(by) < sd / 2 else "more than half"
@@ -469,13 +485,14 @@ def _separated(names: Sequence[str]) -> str:
     )
 
 
-def _ordinal_data(data: ModelData, codes: Integers, n_categories: int, groups: Sequence[str]) -> OrdinalData:
-    term = np.concatenate([np.full(len(data.columns(group)), k) for k, group in enumerate(groups)])
+def _ordinal_data(
+    data: ModelData, codes: Integers, n_categories: int, groups: Sequence[str], of_items: Sequence[str]
+) -> OrdinalData:
     people, items = data.participants, data.items
     return OrdinalData(
         data.x[:, 1:],
         data.slope_columns(groups),
-        term.astype(np.int64),
+        _term_of_column(data, groups),
         codes,
         people.codes,
         # Without items all trials share one, whose SD is held at zero.
@@ -483,4 +500,10 @@ def _ordinal_data(data: ModelData, codes: Integers, n_categories: int, groups: S
         n_categories,
         len(people.names),
         1 if items is None else len(items.names),
+        data.slope_columns(of_items),
+        _term_of_column(data, of_items),
     )
+
+
+def _term_of_column(data: ModelData, effects: Sequence[str]) -> Integers:
+    return np.repeat(np.arange(len(effects)), [len(data.columns(effect)) for effect in effects])

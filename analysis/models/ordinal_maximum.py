@@ -334,46 +334,44 @@ def laplace_step(data: OrdinalData, maximum: Maximum, with_items: bool) -> Float
 
     .. math:: \delta = C \sum_g \nabla (\ell_g^{points} - \ell_g^{Laplace})
     """
-    p = maximum.parameters
-    laplace = LaplaceLikelihood(data)
+    p, laplace = maximum.parameters, LaplaceLikelihood(data)
     laplace.evaluate(p)
-    u, v = laplace.u, laplace.v
-    of_people = np.einsum("tc,tc->t", data.z * p.sd[data.term], u[data.participant])
-    people = _lacking(
-        replace(
-            data,
-            # Items at their modes are one more column, whose coefficient is 1.
-            x=np.column_stack([data.x, p.sd[-1] * v[data.item]]),
-            item=np.zeros_like(data.item),
-            n_items=1,
-        ),
-        Parameters(p.thresholds, np.append(p.beta, 1.0), np.append(p.sd[:-1], 0.0)),
-    )
-    sd = people.sd.copy()
+    scaled, scaled_item = data.scaled(p.sd)
+    of_people = np.einsum("tc,tc->t", scaled, laplace.u[data.participant])
+    of_items = np.einsum("tk,tk->t", scaled_item, laplace.v[data.item])
+    people = _lacking(_one_grouping(data, of_items), p, p.sd[: data.n_terms])
+    sd = np.append(people.sd[:-1], np.zeros(data.n_sds - data.n_terms))
     thresholds, beta = people.thresholds, people.beta[:-1]
-    if with_items and p.sd[-1] > 0:
-        items = _lacking(
-            OrdinalData(
-                np.column_stack([data.x, of_people]),
-                np.ones((len(data.category), 1)),
-                np.zeros(1, np.int64),
-                data.category,
-                data.item,
-                np.zeros_like(data.item),
-                data.n_categories,
-                data.n_items,
-                1,
-            ),
-            Parameters(p.thresholds, np.append(p.beta, 1.0), np.array([p.sd[-1], 0.0])),
+    if with_items and p.sd[data.n_terms :].any():
+        turned = replace(
+            data,
+            z=data.z_item,
+            term=data.term_item,
+            participant=data.item,
+            n_participants=data.n_items,
         )
+        items = _lacking(_one_grouping(turned, of_people), p, p.sd[data.n_terms :])
         thresholds, beta = thresholds + items.thresholds, beta + items.beta[:-1]
-        sd[-1] = items.sd[0]
+        sd[data.n_terms :] = items.sd[:-1]
     gradient = packed_gradient(Parameters(thresholds, beta, sd), np.log(np.diff(p.thresholds)))
     return np.asarray(maximum.covariance @ gradient, dtype=np.float64)
 
 
-def _lacking(d: OrdinalData, p: Parameters) -> Parameters:
+def _one_grouping(data: OrdinalData, of_items: Floats) -> OrdinalData:
+    """The trials with participants alone: items' effects (n,) are one more column, whose coefficient is 1."""
+    return replace(
+        data,
+        x=np.column_stack([data.x, of_items]),
+        z_item=np.ones((len(data.category), 1)),
+        term_item=np.zeros(1, np.int64),
+        item=np.zeros_like(data.item),
+        n_items=1,
+    )
+
+
+def _lacking(d: OrdinalData, whole: Parameters, sd: Floats) -> Parameters:
     """Gradient of the integral over one grouping less that of Laplace's approximation."""
+    p = Parameters(whole.thresholds, np.append(whole.beta, 1.0), np.append(sd, 0.0))
     laplace = LaplaceLikelihood(d)
     _, approximate = laplace.evaluate(p)
     exact = _by_points(d, p, laplace)

@@ -133,14 +133,19 @@ def test_wrong_formulas_are_one_line(tmp_path: Path, formula: str, said: str) ->
     assert "\n" not in str(error.value)
 
 
+def test_a_formula_of_an_ordinal_model_takes_slopes_of_people_and_of_items(tmp_path: Path) -> None:
+    known = json.loads((FOLDER / "item_slopes.json").read_text(encoding="utf-8"))
+    formula = "rating ~ a + (1 + a || participant) + (1 + a || clip)"
+    result = _run(tmp_path, "ordinal", FOLDER / "item_slopes.csv", "--formula", formula)
+    assert result["log_likelihood"] == pytest.approx(known["log_likelihood"], abs=1e-5)
+    assert result["formula"].endswith("+ (1 | clip) + (0 + a | clip), logit")
+
+
 def test_a_formula_goes_with_no_other_option_for_columns(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--formula names all columns and slopes; remove the other options"):
         _run(tmp_path, "mixed", CROSSED, "--formula", "rating ~ 1 + (1 | clip)", "--within", "blur")
     formula = "rating ~ blur + (1 | participant) + (1 | clip) + (1 | lab)"
     with pytest.raises(InputError, match="participants and one more grouping; remove lab"):
-        _run(tmp_path, "ordinal", CROSSED, "--formula", formula)
-    formula = "rating ~ blur + (1 + blur || participant) + (1 + blur || clip)"
-    with pytest.raises(InputError, match="the ordinal model has slopes of participants only"):
         _run(tmp_path, "ordinal", CROSSED, "--formula", formula)
     with pytest.raises(InputError, match="slopes of the ordinal model cannot correlate"):
         _run(tmp_path, "ordinal", CROSSED, "--formula", "rating ~ blur + (1 + blur | participant)")

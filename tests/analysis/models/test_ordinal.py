@@ -52,20 +52,23 @@ def _key(name: str, expected: dict | None = None) -> frozenset[str]:
     return frozenset(parts)
 
 
-def problem(seed: int, columns: int = 1, items: int = 4) -> tuple[OrdinalData, Parameters]:
-    """Five people, some items; the columns after the first share one SD."""
+def problem(seed: int, columns: int = 1, items: int = 4, of_items: int = 1) -> tuple[OrdinalData, Parameters]:
+    """Five people, some items; the columns of each after the first share one SD."""
     rng = np.random.default_rng(seed)
     people = 5
     who, what = (a.ravel() for a in np.meshgrid(np.arange(people), np.arange(items), indexing="ij"))
     x = rng.normal(size=(len(who), 2))
     z = np.hstack([np.ones((len(who), 1)), rng.normal(size=(len(who), columns - 1))])
     term = np.minimum(np.arange(columns), 1)
-    data = OrdinalData(x, z, term, rng.integers(0, 4, len(who)), who, what, 4, people, items)
+    category = rng.integers(0, 4, len(who))
+    z_item = np.hstack([np.ones((len(who), 1)), rng.normal(size=(len(who), of_items - 1))])
+    term_item = np.minimum(np.arange(of_items), 1)
+    data = OrdinalData(x, z, term, category, who, what, 4, people, items, z_item, term_item)
     gaps = np.cumsum(rng.uniform(0.3, 1.5, 3)) - 1.5
     return data, Parameters(gaps, rng.normal(size=2), np.exp(rng.uniform(-1.5, 0.7, data.n_sds)))
 
 
-@given(st.integers(0, 10_000), st.sampled_from([(1, 4), (1, 7), (3, 4), (3, 20)]))
+@given(st.integers(0, 10_000), st.sampled_from([(1, 4), (1, 7), (3, 4), (3, 20), (3, 4, 2), (2, 7, 3)]))
 @settings(max_examples=25, deadline=None)
 def test_gradient_is_that_of_the_likelihood(seed, shape):
     data, p = problem(seed, *shape)
@@ -83,7 +86,7 @@ def test_gradient_is_that_of_the_likelihood(seed, shape):
             assert getattr(gradient, name)[k] == pytest.approx(numeric, rel=1e-4, abs=5e-5)
 
 
-@pytest.mark.parametrize("shape", [(3, 4), (3, 20)])
+@pytest.mark.parametrize("shape", [(3, 4), (3, 20), (2, 4, 3)])
 def test_the_value_is_that_of_the_dense_approximation(shape):
     """By the definition: the joint density at its mode, by a general optimiser, log|H| from differences."""
     data, p = problem(11, *shape)
@@ -91,14 +94,17 @@ def test_the_value_is_that_of_the_dense_approximation(shape):
     size = data.n_participants * data.z.shape[1]
 
     def joint(effects):
-        u, v = effects[:size].reshape(data.n_participants, -1), effects[size:]
-        eta = data.x @ p.beta + (data.z * p.sd[data.term] * u[data.participant]).sum(axis=1)
-        eta = eta + p.sd[-1] * v[data.item]
+        u, v = effects[:size].reshape(data.n_participants, -1), effects[size:].reshape(data.n_items, -1)
+        people, items = p.sd[: data.n_terms][data.term], p.sd[data.n_terms :][data.term_item]
+        eta = data.x @ p.beta + (data.z * people * u[data.participant]).sum(axis=1)
+        eta = eta + (data.z_item * items * v[data.item]).sum(axis=1)
         edges = np.concatenate([[-np.inf], p.thresholds, [np.inf]])
         shares = expit(edges[data.category + 1] - eta) - expit(edges[data.category] - eta)
         return effects @ effects / 2 - np.log(shares).sum()
 
-    mode = minimize(joint, np.zeros(size + data.n_items), method="BFGS", options={"gtol": 1e-7}).x
+    mode = minimize(
+        joint, np.zeros(size + data.n_items * data.z_item.shape[1]), method="BFGS", options={"gtol": 1e-7}
+    ).x
     step = 1e-4 * np.eye(len(mode))
     sides = np.array(
         [[joint(mode + s * a + t * b) * s * t for s in (1, -1) for t in (1, -1)] for a in step for b in step]
@@ -128,6 +134,29 @@ def test_slopes_equal_those_of_clmm():
     # a test of A without its slope takes the spread of people for none
     without = fit_ordinal(rows, "participant", "rating", ["A", "B"], "clip")
     assert without.effects[0].p_value < ours.effects[0].p_value / 5
+
+
+def test_slopes_of_items_equal_those_of_clmm():
+    expected = json.loads((GOLDEN.parent / "item_slopes.json").read_text())
+    rows = pd.read_csv(GOLDEN.parent / "item_slopes.csv")
+    ours = fit_ordinal(rows, "participant", "rating", ["a"], "clip", slopes="all", item_slopes=["a"])
+    assert ours.log_likelihood == pytest.approx(expected["log_likelihood"], abs=1e-5)
+    assert ours.thresholds == pytest.approx(expected["thresholds"], abs=1e-3)
+    (a,) = ours.coefficients
+    assert (a.estimate, a.se) == pytest.approx((expected["estimate"], expected["se"]), rel=2e-3)
+    theirs = {"intercept": "(Intercept)", "a": "x"}
+    sds = {f"{component.group} {theirs[component.term]}": component.sd for component in ours.components}
+    assert sds == pytest.approx(expected["sds"], rel=2e-3)
+    assert ours.notes == ()
+    # A test of a without the clips' slope takes their spread for none.
+    without = fit_ordinal(rows, "participant", "rating", ["a"], "clip", slopes="all")
+    assert without.coefficients[0].se < 0.7 * a.se
+
+
+def test_a_slope_that_no_item_determines_is_refused():
+    rows = pd.read_csv(GOLDEN.parent / "ordinal_slopes.csv")
+    with pytest.raises(InputError, match="the slope of A by clip is not determined"):
+        fit_ordinal(rows, "participant", "rating", ["A", "B"], "clip", item_slopes=["A"])
 
 
 def test_separated_cells_are_called_so_and_not_too_few_ratings():
@@ -162,11 +191,23 @@ def test_without_spread_it_is_the_plain_ordinal_likelihood():
 
 
 def test_swapping_participants_and_items_changes_nothing():
-    data, p = problem(8)
-    turned = replace(data, participant=data.item, item=data.participant, n_participants=4, n_items=5)
-    value, _ = LaplaceLikelihood(data).evaluate(p)
-    other, _ = LaplaceLikelihood(turned).evaluate(Parameters(p.thresholds, p.beta, p.sd[::-1]))
+    data, p = problem(8, 3, 4, 2)
+    turned = replace(
+        data,
+        z=data.z_item,
+        term=data.term_item,
+        participant=data.item,
+        n_participants=data.n_items,
+        z_item=data.z,
+        term_item=data.term,
+        item=data.participant,
+        n_items=data.n_participants,
+    )
+    value, gradient = LaplaceLikelihood(data).evaluate(p)
+    sds = np.roll(p.sd, data.n_sds - data.n_terms)
+    other, turned_gradient = LaplaceLikelihood(turned).evaluate(Parameters(p.thresholds, p.beta, sds))
     assert other == pytest.approx(value, rel=1e-12)
+    assert np.roll(turned_gradient.sd, data.n_terms) == pytest.approx(gradient.sd, rel=1e-8)
 
 
 def test_continuous_ratings_are_refused():

@@ -40,7 +40,9 @@ def small() -> OrdinalData:
     score = 0.8 * x[:, 0] + rng.normal(0, 1, 5)[participant] + rng.logistic(size=30)
     zeros = np.zeros(30, np.int64)
     category = np.searchsorted([-1.0, 1.0], score).astype(np.int64)
-    return OrdinalData(x, np.ones((30, 1)), zeros[:1], category, participant, zeros, 3, 5, 1)
+    return OrdinalData(
+        x, np.ones((30, 1)), zeros[:1], category, participant, zeros, 3, 5, 1, np.ones((30, 1)), zeros[:1]
+    )
 
 
 AT = Parameters(np.array([-1.1, 0.9]), np.array([0.7]), np.array([np.exp(0.2), 0.0]))
@@ -141,7 +143,17 @@ def test_the_warning_knows_how_far_the_estimates_are_off() -> None:
     score = 0.8 * x[:, 0] + rng.normal(0, 1.5, 80)[participant] + rng.logistic(size=480)
     zeros = np.zeros(480, np.int64)
     data = OrdinalData(
-        x, np.ones((480, 1)), zeros[:1], (score > 0).astype(np.int64), participant, zeros, 2, 80, 1
+        x,
+        np.ones((480, 1)),
+        zeros[:1],
+        (score > 0).astype(np.int64),
+        participant,
+        zeros,
+        2,
+        80,
+        1,
+        np.ones((480, 1)),
+        zeros[:1],
     )
     laplace = maximise(LaplaceLikelihood(data), pooled_start(data, False), False)
     exact = maximise(QuadratureLikelihood(data, 60), laplace.parameters, False).parameters
@@ -164,7 +176,9 @@ def test_points_of_many_dimensions_find_nothing_where_laplace_is_nearly_exact() 
     score = 0.5 * z[:, 1] + (z * own[participant]).sum(axis=1) + rng.logistic(size=n * each)
     zeros = np.zeros(n * each, np.int64)
     category = np.searchsorted([-1.5, 0.0, 1.5], score).astype(np.int64)
-    data = OrdinalData(z[:, 1:], z, np.arange(4), category, participant, zeros, 4, n, 1)
+    data = OrdinalData(
+        z[:, 1:], z, np.arange(4), category, participant, zeros, 4, n, 1, np.ones((len(z), 1)), zeros[:1]
+    )
     maximum = maximise(LaplaceLikelihood(data), pooled_start(data, False), False)
     step, errors = laplace_step(data, maximum, False), np.sqrt(np.diag(maximum.covariance))
     assert (np.abs(step[3:6]) < 0.03 * errors[3:6]).all()
