@@ -371,17 +371,21 @@ def bayes_factors(analysis: Analysis) -> Section:
         "bayes", caption("Bayes factors of pairs", analysis.name, analysis.synthetic), header, tuple(rows), 1
     )
     text = (
-        "BF₁₀ compares a difference with no difference; BF₀₁ is the reverse. JZS prior, Cauchy scale r = "
-        "√2/2. Values between 1/3 and 3 are weak (inconclusive) evidence."
+        "BF₁₀ compares a difference with no difference; BF₀₁ is the reverse. JZS prior (Rouder et al., "
+        "2009), Cauchy scale r = √2/2. Values between 1/3 and 3 are weak (inconclusive) evidence."
     )
     return Section("Bayes factors", text, (table,))
+
+
+_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def _factor(value: float) -> str:
     if not isfinite(value):
         return DASH
     if value >= 1000:
-        return f"{value:.1e}"
+        mantissa, exponent = f"{value:.1e}".split("e+")
+        return f"{mantissa} × 10{str(int(exponent)).translate(_RAISED)}"
     if value < 0.001:
         return "<.001"
     return fixed(value, 2 if value >= 0.1 else 3)

@@ -1,16 +1,18 @@
 """Paired comparisons and thresholds as tables and words."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 
 from analysis.pairs.abilities import Contrast, PairsResult
 from analysis.pairs.intervals import QuestionPair
 from analysis.pairs.jod_and_elo import EloResult, JodResult
 from analysis.report.contents import caption, mark_name
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, apa_p, decimals, fixed, interval, p_value
+from analysis.report.numbers import DASH, apa_p, decimals, fixed, interval, p_value, share
 from analysis.thresholds.likelihood import Interval
 from analysis.thresholds.people import Average, PersonThreshold, ThresholdsResult
-from analysis.thresholds.plane_people import PersonPlane, PlanesResult
+from analysis.thresholds.plane import Plane
+from analysis.thresholds.plane_people import PersonPlane, PlanesResult, PopulationPlane
 
 # Paired comparisons as tables and words.
 
@@ -272,7 +274,7 @@ def threshold_table(result: ThresholdsResult, name: str, synthetic: bool = False
             interval_text(fit.threshold_ci, digits),
             fixed(fit.spread, digits),
             DASH if fit.x75 is None else fixed(fit.x75, digits),
-            fixed(fit.lapse, 3),
+            share(fit.lapse),
             p_value(fit.p),
             str(fit.n_trials),
         )
@@ -392,11 +394,12 @@ def table_of_people(
 ) -> Table:
     """What was measured of every person in every condition, or why nothing could be."""
     rows = tuple(
-        (one.participant, one.condition, *(cells or (one.reason, *[""] * (len(measures) - 1))))
-        for one, cells in people
+        (one.participant, one.condition, *(cells or [DASH] * len(measures))) for one, cells in people
     )
+    reasons = Counter(one.reason for one, cells in people if not cells)
+    notes = tuple(f"{DASH} ({count} of {len(rows)} rows): {reason}." for reason, count in reasons.items())
     title = caption("Thresholds by person", name, synthetic)
-    return Table("threshold-people", title, ("Person", "Condition", *measures), rows, 2, (), True)
+    return Table("threshold-people", title, ("Person", "Condition", *measures), rows, 2, notes, True)
 
 
 def threshold_text(result: ThresholdsResult, name: str, synthetic: bool = False) -> str:
@@ -422,6 +425,18 @@ def interval_text(interval: Interval, digits: int = 3) -> str:
 # Thresholds over two stimulus variables as tables and words.
 
 
+def plane_decimals(result: PlanesResult) -> tuple[int, int]:
+    """Decimals of every threshold and of every tilt: what the narrowest interval supports."""
+    fits: list[Plane | PopulationPlane] = [*result.pooled.values(), *result.population.values()]
+
+    def of(intervals: Iterable[Interval]) -> int:
+        # an interval of 95% is about four standard errors wide
+        ends = [(one.low, one.high) for one in intervals]
+        return decimals((high - low) / 4 for low, high in ends if low is not None and high is not None)
+
+    return of(fit.threshold_ci for fit in fits), of(fit.tilt_ci for fit in fits)
+
+
 def plane_tables(
     result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool = False
 ) -> tuple[Table, ...]:
@@ -431,12 +446,13 @@ def plane_tables(
 
 
 def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool) -> Table:
+    digits, tilt_digits = plane_decimals(result)
     rows = [
         (
             f"{condition}, {fit.people} people",
-            *estimate(fit.threshold, fit.threshold_ci),
-            *estimate(fit.tilt, fit.tilt_ci),
-            fixed(fit.spread, 3),
+            *estimate(fit.threshold, fit.threshold_ci, digits),
+            *estimate(fit.tilt, fit.tilt_ci, tilt_digits),
+            fixed(fit.spread, digits),
             DASH,
             DASH,
         )
@@ -445,9 +461,9 @@ def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, syn
     rows += [
         (
             f"{condition}, all trials" if result.people else condition,
-            *estimate(fit.threshold, fit.threshold_ci),
-            *estimate(fit.tilt, fit.tilt_ci),
-            fixed(fit.spread, 3),
+            *estimate(fit.threshold, fit.threshold_ci, digits),
+            *estimate(fit.tilt, fit.tilt_ci, tilt_digits),
+            fixed(fit.spread, digits),
             p_value(fit.p),
             str(fit.n_trials),
         )
@@ -456,7 +472,7 @@ def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, syn
     for condition, means in result.means.items():
         if means.threshold is not None and means.tilt is not None:
             label = f"{condition}, mean of {means.threshold.people} individual fits"
-            cells = (*_average(means.threshold), *_average(means.tilt))
+            cells = (*_average(means.threshold, digits), *_average(means.tilt, tilt_digits))
             rows.append((label, *cells, DASH, DASH, DASH))
     header = ("Condition", "Threshold", "95% CI", "Tilt", "95% CI", "Spread", "fit p", "Trials")
     middle = next(iter(result.pooled.values())).middle
@@ -473,21 +489,22 @@ def _of_people(result: PlanesResult) -> tuple[str, ...]:
     """What the rows are of, and how people differ."""
     if not result.people:
         return ()
+    digits, tilt_digits = plane_decimals(result)
     differ = [
-        f"{condition}: {fixed(fit.threshold_sd, 3)} and {fixed(fit.tilt_sd, 3)}"
+        f"{condition}: {fixed(fit.threshold_sd, digits)} and {fixed(fit.tilt_sd, tilt_digits)}"
         for condition, fit in result.population.items()
     ]
     said = "All trials: treated as if from one person. The intervals are too narrow if people differ."
     return (said, f"SD between people of threshold and tilt: {'; '.join(differ)}.") if differ else (said,)
 
 
-def _average(one: Average) -> tuple[str, str]:
-    return fixed(one.mean, 3), interval((one.ci_low, one.ci_high), 3)
+def _average(one: Average, digits: int) -> tuple[str, str]:
+    return fixed(one.mean, digits), interval((one.ci_low, one.ci_high), digits)
 
 
 def _line(result: PlanesResult, variables: tuple[str, str], name: str, synthetic: bool) -> Table:
     rows = tuple(
-        (condition, f"{point.z:g}", *estimate(point.threshold, point.ci))
+        (condition, f"{point.z:g}", *estimate(point.threshold, point.ci, plane_decimals(result)[0]))
         for condition, fit in result.pooled.items()
         for point in fit.line
     )
@@ -496,14 +513,15 @@ def _line(result: PlanesResult, variables: tuple[str, str], name: str, synthetic
 
 
 def _people(result: PlanesResult, name: str, synthetic: bool) -> Table:
+    digits, tilt_digits = plane_decimals(result)
     rows = [
         (
             one,
             None
             if one.fit is None
             else (
-                *estimate(one.fit.threshold, one.fit.threshold_ci),
-                *estimate(one.fit.tilt, one.fit.tilt_ci),
+                *estimate(one.fit.threshold, one.fit.threshold_ci, digits),
+                *estimate(one.fit.tilt, one.fit.tilt_ci, tilt_digits),
             ),
         )
         for one in result.people

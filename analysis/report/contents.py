@@ -1,7 +1,8 @@
 """What a report says, whatever the kind of trial: who was left out, and tables, sentences and figures."""
 
+import re
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -24,6 +25,12 @@ class Picture:
     alt: str
     svg: bytes
     png: bytes
+
+    @property
+    def note(self) -> str:
+        """The note under the figure: what it shows, without its caption."""
+        said = self.alt.removeprefix(f"{self.caption}: ").removesuffix(".") + "."
+        return said[:1].upper() + said[1:]
 
     @property
     def data_url(self) -> str:
@@ -183,6 +190,95 @@ class DrawnPart:
     self_check: str
     pictures: tuple[Picture, ...]
     sections: tuple[Section, ...]
+
+
+# Where the text mentions tables and figures, and the works that it cites.
+
+
+@dataclass(frozen=True)
+class Mention:
+    """The place of a table's or figure's number in a sentence."""
+
+    noun: str
+    key: str
+
+
+def mentions(tables: Sequence[Table], pictures: Sequence[Picture]) -> list[str | Mention]:
+    """A sentence that points to every table and figure of a section; empty without any.
+
+    Examples
+    --------
+    >>> tables = [Table(key, key, (), ()) for key in "abc"]
+    >>> mentions(tables, [])[1:]
+    [Mention(noun='Table', key='a'), ' to ', Mention(noun='Table', key='c'), '.']
+    """
+    said: list[str | Mention] = []
+    for noun, keys in (("Table", [one.key for one in tables]), ("Figure", [one.key for one in pictures])):
+        if keys:
+            said.append(f"{' and ' if said else 'See '}{noun}{'s' if len(keys) > 1 else ''}\u00a0")
+            said.append(Mention(noun, keys[0]))
+        if len(keys) > 1:
+            said += [" to " if len(keys) > 2 else " and ", Mention(noun, keys[-1])]
+    return [*said, "."] if said else []
+
+
+def numbers_of(parts: Sequence[DrawnPart], evidence: Section | None) -> dict[Mention, int]:
+    """Tables and figures counted in the order of the report."""
+    tables: list[Table] = []
+    pictures: list[Picture] = []
+    for part in parts:
+        tables += [part.first, *part.tables]
+        pictures += part.pictures
+        for section in part.sections:
+            tables += section.tables
+            pictures += section.pictures
+    tables += evidence.tables if evidence else ()
+    counted = {Mention("Table", one.key): number for number, one in enumerate(tables, 1)}
+    return counted | {Mention("Figure", one.key): number for number, one in enumerate(pictures, 1)}
+
+
+_WORKS = (
+    "Cousineau, D. (2005). Confidence intervals in within-subject designs: A simpler solution to Loftus and "
+    "Masson's method. *Tutorials in Quantitative Methods for Psychology*, *1*(1), 42–45. "
+    "https://doi.org/10.20982/tqmp.01.1.p042",
+    "Davidson, R. R. (1970). On extending the Bradley-Terry model to accommodate ties in paired comparison "
+    "experiments. *Journal of the American Statistical Association*, *65*(329), 317–328. "
+    "https://doi.org/10.1080/01621459.1970.10481082",
+    "Freedman, D., & Lane, D. (1983). A nonstochastic interpretation of reported significance levels. "
+    "*Journal of Business & Economic Statistics*, *1*(4), 292–298. "
+    "https://doi.org/10.1080/07350015.1983.10509354",
+    "Liang, K.-Y., & Zeger, S. L. (1986). Longitudinal data analysis using generalized linear models. "
+    "*Biometrika*, *73*(1), 13–22. https://doi.org/10.1093/biomet/73.1.13",
+    "Morey, R. D. (2008). Confidence intervals from normalized data: A correction to Cousineau (2005). "
+    "*Tutorials in Quantitative Methods for Psychology*, *4*(2), 61–64. "
+    "https://doi.org/10.20982/tqmp.04.2.p061",
+    "Rouder, J. N., Speckman, P. L., Sun, D., Morey, R. D., & Iverson, G. (2009). Bayesian t tests for "
+    "accepting and rejecting the null hypothesis. *Psychonomic Bulletin & Review*, *16*(2), 225–237. "
+    "https://doi.org/10.3758/PBR.16.2.225",
+    "Steiger, J. H. (2004). Beyond the F test: Effect size confidence intervals and tests of close fit in "
+    "the analysis of variance and contrast analysis. *Psychological Methods*, *9*(2), 164–182. "
+    "https://doi.org/10.1037/1082-989X.9.2.164",
+    "Wobbrock, J. O., Findlater, L., Gergle, D., & Higgins, J. J. (2011). The aligned rank transform for "
+    "nonparametric factorial analyses using only ANOVA procedures. In *Proceedings of the SIGCHI Conference "
+    "on Human Factors in Computing Systems* (pp. 143–146). ACM. https://doi.org/10.1145/1978942.1978963",
+    "Yuen, K. K. (1974). The two-sample trimmed t for unequal population variances. *Biometrika*, *61*(1), "
+    "165–170. https://doi.org/10.1093/biomet/61.1.165",
+)
+_CITED = re.compile(r"\b([A-Z][a-z]+)(?:'s)?(?:,| et al\.| & [A-Z][a-z]+)*,? \(?((?:19|20)\d\d)\b")
+_WORK = re.compile(r"([A-Z][a-z]+), .*?\(((?:19|20)\d\d)\)\.")
+
+
+def cited_works(parts: Sequence[DrawnPart], methods: str) -> list[list[tuple[str, bool]]]:
+    """The references of what the report cites, in pieces; True where one is in italics."""
+    said = [methods]
+    for part in parts:
+        said += [note for table in (part.first, *part.tables) for note in table.notes]
+        for section in part.sections:
+            said += [section.text, *(note for table in section.tables for note in table.notes)]
+        said += [picture.alt for picture in part.pictures]
+    cited = {one.groups() for text in said for one in _CITED.finditer(text)}
+    works = [work for work in _WORKS if (head := _WORK.match(work)) and head.groups() in cited]
+    return [[(piece, bool(at % 2)) for at, piece in enumerate(work.split("*")) if piece] for work in works]
 
 
 # What every table, figure and sentence of made data is called.

@@ -550,7 +550,7 @@ def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
         if len(drawn) < p.shape[1]:
             note += f" The {len(drawn)} effects of {p.shape[1]} with the smallest p as declared."
         write_note(figure, note, analysis.synthetic)
-    what = "p of every effect under each choice of the declared exclusion rules"
+    what = "the p value of every effect under each choice of the declared exclusion rules"
     return Picture(
         "figure-multiverse",
         "Multiverse of exclusions",

@@ -20,6 +20,25 @@ class Table:
     folded: bool = False
     """Whether the HTML report shows it folded: it is long, or for reference."""
 
+    @property
+    def note(self) -> str:
+        """The notes as one paragraph; empty without any."""
+        return " ".join(map(as_sentence, self.notes))
+
+
+def as_sentence(text: str) -> str:
+    """A line with a capital at its start, where it begins with a word, and a full stop at its end.
+
+    Examples
+    --------
+    >>> as_sentence("rating p_1"), as_sentence("exp1 has none."), as_sentence("")
+    ('Rating p_1.', 'exp1 has none.', '')
+    """
+    first = text.split(" ", 1)[0].rstrip(",:")
+    is_word = len(first) > 1 and first.isalpha() and first.islower()
+    said = text[:1].upper() + text[1:] if is_word else text
+    return said if not said or said.endswith((".", "!", "?")) else f"{said}."
+
 
 def as_text(table: Table, width: int = WIDTH) -> str:
     """Monospaced text, `width` columns wide where it can be broken; long first cells wrap, mostly at ':'.
@@ -113,8 +132,8 @@ def _markdown_cell(cell: str) -> str:
 LINE_CHARACTERS = 100
 """Characters of a table's font in a line of LaTeX's page, some spared."""
 GAP_CHARACTERS = 2
-CM_A_CHARACTER, CM_BESIDE = 0.19, 0.48
-"""Of Word's tables at 8 points: a character, bold ones too, and the space around a cell's text."""
+CM_A_CHARACTER, CM_BESIDE = 0.17, 0.32
+"""Of Word's tables at 9 points: a character, and the space around a cell's text."""
 FEWEST_CM = 2.4
 
 
@@ -130,13 +149,19 @@ def widths_cm(table: Table, room: float) -> list[float]:
 
     Columns of numbers are as wide as their widest cell; those of text share what is left by their need.
     """
-    needs = [size * CM_A_CHARACTER + CM_BESIDE for size in _sizes(table)]
+    columns = zip(table.header, *table.rows, strict=True)
+    needs = [max(map(_print_width, column)) * CM_A_CHARACTER + CM_BESIDE for column in columns]
     spare = room - sum(needs)
     if spare >= 0:
         return needs
     texts = needs[: table.text_columns]
     factor = (sum(texts) + spare) / sum(texts)
     return [*(max(width * factor, min(width, FEWEST_CM)) for width in texts), *needs[table.text_columns :]]
+
+
+def _print_width(text: str) -> float:
+    """The characters of a text, in which capitals count more."""
+    return len(text) + 0.4 * sum(one.isupper() for one in text)
 
 
 def _sizes(table: Table) -> list[int]:

@@ -1,23 +1,35 @@
 """Tables for LaTeX, and the report as a whole document that pdfLaTeX, XeLaTeX and LuaLaTeX set."""
 
 import re
+from collections.abc import Sequence
 
-from analysis.report.contents import Contents, DrawnPart, Picture, Section
-from analysis.report.formats import Table, text_share
-from analysis.report.numbers import heading_pieces, pieces, signed_cell, with_minus
+from analysis.report.contents import Contents, DrawnPart, Mention, Picture, Section, cited_works, mentions
+from analysis.report.formats import Table, as_sentence, text_share
+from analysis.report.numbers import (
+    cell_pieces,
+    heading_pieces,
+    note_pieces,
+    pieces,
+    unbroken,
+    with_minus,
+)
 
 NEEDS = r"\usepackage{array,booktabs,graphicx,longtable}"
 """What a document must load for the tables."""
 
 LONG = 36
 """A table of more rows is broken over pages."""
+FLOATS = "[!htbp]"
+BARRIER = "\\ifdefined\\FloatBarrier\\FloatBarrier\\fi\n"
+"""Before a long table, which does not float: others would come after it."""
 WIDE = 40
 """A first cell of more characters is wrapped."""
 
 _MATH = {
     **{"<": "<", ">": ">", "×": r"\times", "±": r"\pm", "−": "-", "√": r"\surd", "≤": r"\le", "≥": r"\ge"},
     **{"≈": r"\approx", "≠": r"\ne", "∞": r"\infty", "→": r"\rightarrow", "←": r"\leftarrow", "·": r"\cdot"},
-    **{"²": "^2", "³": "^3", "¹": "^1", "ₚ": "_p", "₀": "_0", "₁": "_1", "₂": "_2", "Δ": r"\Delta"},
+    **{"²": "^2", "³": "^3", "¹": "^1", "⁰": "^0", "⁴": "^4", "⁵": "^5", "⁶": "^6", "⁷": "^7", "⁸": "^8"},
+    **{"⁹": "^9", "ₚ": "_p", "₀": "_0", "₁": "_1", "₂": "_2", "Δ": r"\Delta"},
     **{"Λ": r"\Lambda", "Φ": r"\Phi", "Σ": r"\Sigma", "Ω": r"\Omega", "α": r"\alpha", "β": r"\beta"},
     **{"γ": r"\gamma", "δ": r"\delta", "ε": r"\varepsilon", "η": r"\eta", "θ": r"\theta", "κ": r"\kappa"},
     **{"λ": r"\lambda", "μ": r"\mu", "µ": r"\mu", "ν": r"\nu", "π": r"\pi", "ρ": r"\rho", "σ": r"\sigma"},
@@ -42,11 +54,21 @@ _PREAMBLE = r"""% Set it with pdflatex, xelatex or lualatex, in the folder of th
 DECLARED\else
 ACTIVE\fi
 \usepackage[margin=2.3cm]{geometry}
-\usepackage{float}
 NEEDS
+% captions as APA style has them: the number in bold, the title below it in italics
+\usepackage{caption}
+\captionsetup{labelfont=bf,textfont=it,labelsep=newline,justification=raggedright,singlelinecheck=false}
+\captionsetup{font=normalsize,skip=4pt,position=top}
+% tables and figures stay in their order, also next to tables over several pages
+\IfFileExists{placeins.sty}{\usepackage{placeins}}{\newcommand{\FloatBarrier}{\clearpage}}
+\renewcommand{\topfraction}{.9}\renewcommand{\bottomfraction}{.9}
+\renewcommand{\textfraction}{.05}\renewcommand{\floatpagefraction}{.7}
+\setcounter{topnumber}{4}\setcounter{bottomnumber}{4}\setcounter{totalnumber}{8}
+\setcounter{secnumdepth}{0}
+\setlength{\LTleft}{0pt}\setlength{\LTright}{\fill}\AtBeginDocument{\setlength{\LTcapwidth}{\textwidth}}
 \setlength{\parindent}{0pt}
 \setlength{\parskip}{.5\baselineskip}
-\emergencystretch=3em
+\emergencystretch=8em\hbadness=10000
 """
 
 
@@ -56,38 +78,46 @@ def latex_text(text: str) -> str:
     White space of any length is one space: an empty line ends a paragraph, which no caption may hold.
     """
     in_one_line = _CONTROL.sub("\N{REPLACEMENT CHARACTER}", re.sub(r"[ \t\n]+", " ", text))
-    return "".join(_LATEX.get(character, character) for character in in_one_line)
+    made = "".join(_LATEX.get(character, character) for character in in_one_line)
+    # below one another, as in the partial η²
+    return made.replace(r"\ensuremath{_p}\ensuremath{^2}", r"\ensuremath{_p^2}")
 
 
 def as_latex(table: Table, position: str = "") -> str:
     """A table by booktabs with caption, label and notes; a long one is broken over pages.
 
-    `position` is the option of a floating table: `[H]` keeps it in place.
+    `position` is the option of a floating table.
     """
     caption = f"\\caption{{{latex_text(table.title)}}}\\label{{tab:{table.key}}}"
     heads = " & ".join(_in_italics(head) for head in heading_pieces(table.header))
     header = f"\\toprule\n{heads} \\\\\n\\midrule\n"
     rows = "\n".join(_row(row, table.text_columns) for row in table.rows)
     columns = _columns(table)
-    notes = "".join(f"\\par\\smallskip{{\\footnotesize {_sentence(note)}\\par}}\n" for note in table.notes)
+    notes = _note(table.note)
     if len(table.rows) > LONG:
         return (
-            f"{{\\footnotesize\\setlength{{\\tabcolsep}}{{4pt}}\n\\begin{{longtable}}{{{columns}}}\n"
+            f"{BARRIER}{{\\footnotesize\\setlength{{\\tabcolsep}}{{4pt}}\n\\begin{{longtable}}{{{columns}}}\n"
             f"{caption}\\\\\n{header}\\endfirsthead\n{header}\\endhead\n\\bottomrule\n\\endfoot\n{rows}\n"
             f"\\end{{longtable}}}}\n{notes}"
         )
     # a table wider than the text is made as narrow as it, others stay as they are
     fitted = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
     return (
-        f"\\begin{{table}}{position}\n\\centering\\small\n{caption}\n{fitted}\n\\begin{{tabular}}{{{columns}}}\n"
+        f"\\begin{{table}}{position}\n\\raggedright\\small\n{caption}\n{fitted}\n\\begin{{tabular}}{{{columns}}}\n"
         f"{header}{rows}\n\\bottomrule\n\\end{{tabular}}}}\n{notes}\\end{{table}}\n"
     )
 
 
+def _note(text: str) -> str:
+    if not text:
+        return ""
+    return f"\\par\\smallskip{{\\footnotesize\\raggedright \\textit{{Note.}} {_noted(text)}\\par}}\n"
+
+
 def _row(cells: tuple[str, ...], text_columns: int) -> str:
     """A row, with a minus sign before numbers alone: ids and labels keep their hyphens."""
-    signs = (signed_cell(cell, position >= text_columns) for position, cell in enumerate(cells))
-    return " & ".join(map(latex_text, signs)) + r" \\"
+    made = (cell_pieces(cell, position >= text_columns) for position, cell in enumerate(cells))
+    return " & ".join(map(_in_italics, made)) + r" \\"
 
 
 def _columns(table: Table) -> str:
@@ -127,9 +157,11 @@ def as_document(contents: Contents, parts: tuple[DrawnPart, ...], version: str) 
         body += _part(part, contents.synthetic)
     if contents.evidence:
         body += _section(contents.evidence, "section", contents.synthetic)
+    body += [r"\FloatBarrier", r"\section{Method}", _noted(contents.methods)]
+    if works := cited_works(parts, contents.methods):
+        body.append(r"\section{References}")
+        body += [rf"\hangindent=1.27cm\hangafter=1 {_reference(work)}" for work in works]
     body += [
-        r"\section{Method}",
-        latex_text(with_minus(contents.methods)),
         f"Made by palpebra {latex_text(version)}.",
     ]
     text = "\n\n".join([*body, r"\end{document}"]) + "\n"
@@ -163,12 +195,21 @@ def _active(text: str) -> str:
 def _lines(title: str, lines: tuple[str, ...]) -> list[str]:
     if not lines:
         return []
-    items = "\n".join(rf"\item {_sentence(line)}" for line in lines)
+    items = "\n".join(rf"\item {_sentence(as_sentence(line))}" for line in lines)
     return [rf"\section{{{latex_text(title)}}}", f"\\begin{{itemize}}\n{items}\n\\end{{itemize}}"]
 
 
 def _sentence(text: str) -> str:
-    return _in_italics(pieces(with_minus(text)))
+    return _in_italics(pieces(unbroken(with_minus(text))))
+
+
+def _noted(text: str) -> str:
+    return _in_italics(note_pieces(unbroken(with_minus(text))))
+
+
+def _reference(work: list[tuple[str, bool]]) -> str:
+    """A work of the list, in which an address may be broken at its slashes."""
+    return _in_italics(work).replace("/", r"/\allowbreak{}")
 
 
 def _in_italics(split: list[tuple[str, bool]]) -> str:
@@ -180,39 +221,39 @@ def _in_italics(split: list[tuple[str, bool]]) -> str:
 def _part(part: DrawnPart, synthetic: bool) -> list[str]:
     heading = "subsection" if part.title else "section"
     made = [rf"\section{{{latex_text(part.title)}}}"] if part.title else []
-    made += [rf"\{heading}{{Results}}", _pointer(part), as_latex(part.first, "[H]")]
+    made += [rf"\{heading}{{Results}}", _pointer([part.first], part.pictures), as_latex(part.first, FLOATS)]
     made += [_figure(picture, synthetic) for picture in part.pictures]
     in_sentences = _lines("In sentences", part.sentences)
-    made += [rf"\{heading}{{In sentences}}", *in_sentences[1:], latex_text(part.self_check)]
+    made += [rf"\{heading}{{In sentences}}", *in_sentences[1:], _noted(part.self_check)]
     if part.tables:
-        made += [rf"\{heading}{{Every test}}", *(as_latex(table, "[H]") for table in part.tables)]
+        made += [rf"\{heading}{{Every test}}", _pointer(part.tables, ())]
+        made += [as_latex(table, FLOATS) for table in part.tables]
     for section in part.sections:
         made += _section(section, heading, synthetic)
     return made
 
 
-def _pointer(part: DrawnPart) -> str:
-    """Which table and figures answer the question."""
-    said = rf"See Table~\ref{{tab:{part.first.key}}}"
-    figures = [rf"\ref{{fig:{picture.key}}}" for picture in part.pictures]
-    if figures:
-        said += f" and {'Figure' if len(figures) == 1 else 'Figures'}~{', '.join(figures)}"
-    return f"{said}."
+def _pointer(tables: Sequence[Table], pictures: Sequence[Picture]) -> str:
+    """Which tables and figures hold the results."""
+    kinds = {"Table": "tab", "Figure": "fig"}
+    return "".join(
+        rf"\ref{{{kinds[one.noun]}:{one.key}}}" if isinstance(one, Mention) else latex_text(one)
+        for one in mentions(tables, pictures)
+    )
 
 
 def _section(section: Section, heading: str, synthetic: bool) -> list[str]:
     return [
         rf"\{heading}{{{latex_text(section.title)}}}",
-        _sentence(section.text),
+        f"{_noted(section.text)} {_pointer(section.tables, section.pictures)}",
         *(_figure(picture, synthetic) for picture in section.pictures),
-        *(as_latex(table, "[H]") for table in section.tables),
+        *(as_latex(table, FLOATS) for table in section.tables),
     ]
 
 
 def _figure(picture: Picture, synthetic: bool) -> str:
     caption = latex_text(picture.caption) + (" (synthetic data)" if synthetic else "")
     return (
-        "\\begin{figure}[H]\n\\centering\n"
-        f"\\includegraphics[width=.95\\linewidth]{{{picture.key}.png}}\n"
-        f"\\caption{{{caption}}}\\label{{fig:{picture.key}}}\n\\end{{figure}}\n"
+        f"\\begin{{figure}}{FLOATS}\n\\raggedright\n\\caption{{{caption}}}\\label{{fig:{picture.key}}}\n"
+        f"\\includegraphics[width=.95\\linewidth]{{{picture.key}.png}}\n{_note(picture.note)}\\end{{figure}}\n"
     )

@@ -65,14 +65,16 @@ def f_text(value: float) -> str:
     return fixed(value, 3 if abs(value) < 1000 else 1)
 
 
-def sum_text(value: float) -> str:
-    """A sum of squares with four significant digits."""
-    if not math.isfinite(value):
-        return DASH
-    if value == 0:
-        return "0"
-    digits = max(0, 3 - math.floor(math.log10(abs(value))))
-    return fixed(value, min(digits, 4))
+def sum_digits(values: Iterable[float]) -> int:
+    """Decimals for a column of sums of squares: two, or four digits of the largest where that needs more.
+
+    Examples
+    --------
+    >>> sum_digits([71.8, 0.02]), sum_digits([0.0123]), sum_digits([])
+    (2, 5, 2)
+    """
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    return min(max(2, 3 - math.floor(math.log10(largest))), 6) if largest else 2
 
 
 def interval(bounds: tuple[float, float], digits: int = 2) -> str:
@@ -89,8 +91,20 @@ def share_interval(bounds: tuple[float, float]) -> str:
 
 # Which letters are symbols of statistics, which APA style sets in italics, and which hyphens are minus.
 
-_SYMBOL = re.compile(r"(?<![\w'’])(?:SE|SD|[FtpMNnzrdWVqb])(?=(?:\([\d., ]+\))? ?[=<>≤≥] ?[-−]?[\d.])")
+_SYMBOL = re.compile(r"(?<![\w'’])(?:SE|SD|[FtpMNnzrdWVqb])(?=(?:\([\d.,\s]+\))?\s?[=<>≤≥]\s?[-−]?[\d.√])")
 _HEADING = re.compile(r"(?<![\w/'’])(?:SE|SD|SS|MS|df|dz|BF|[FtpnzrWb])(?![A-Za-z0-9_/'’])")
+# In what the report says of itself, where a level may be called F: letters next to words of tests alone.
+_NOTED = re.compile(
+    r"(?<![\w/'’])(?:(?:SE|SD|SS|df|dz)(?![\w/'’])|BF(?=[₀₁])"
+    r"|[FtpzW](?=: [A-Za-z]| (?:tests?|values?|intervals?|adjusted|belongs|with|on|of|in the|is|use)\b)"
+    r"|(?<=exact )F|(?<=variate )F|(?<=The )F(?= reported)"
+    r"|[FPV](?=\([xzPR(])|[FP](?=(?: the)? normal)"
+    r"|(?<=\()q(?=, )|N(?= − q)|(?<=N − )q(?=\)))"
+)
+_TOGETHER = re.compile(
+    r"(?<![\w'’])(?:[A-Za-z]{1,2}|[ηωε]ₚ?²?|χ²|BF₁₀)(?:\([\d., ]+\))? [=<>≤≥] (?=[-−]?[\d.√])"
+    r"|\d% CI \[[^]]*\]"
+)
 _TESTS = re.compile(r"\b(?:df|p)\b|BF")
 _MINUS = re.compile(r"(?<![\w./])-(?=\.?\d[\d.]*+(?>(?:e[-+]?\d++)?)(?!\w))")
 _LETTER = re.compile(r"(?!(?<=\d)e[-+]?\d)[^\W\d_]|[/_]")
@@ -105,6 +119,32 @@ def pieces(text: str) -> list[tuple[str, bool]]:
     [('F', True), ('(1, 18) = 4.50, ', False), ('p', True), (' = .048', False)]
     """
     return _split(text, _SYMBOL)
+
+
+def note_pieces(text: str) -> list[tuple[str, bool]]:
+    """A note in pieces, where symbols also occur without a number, and a hyphen between spaces is a minus.
+
+    Examples
+    --------
+    >>> note_pieces("SE: of means. Paired t tests; p adjusted; level F and point p.")[:4]
+    [('SE', True), (': of means. Paired ', False), ('t', True), (' tests; ', False)]
+    """
+    return [
+        one
+        for piece, is_symbol in _split(text.replace(" - ", " − "), _SYMBOL)
+        for one in ([(piece, True)] if is_symbol else _split(piece, _NOTED))
+    ]
+
+
+def unbroken(text: str) -> str:
+    """The text with spaces inside a statistic at which no line ends.
+
+    Examples
+    --------
+    >>> unbroken("so p = .04, of a").split(" ")
+    ['so', 'p\\xa0=\\xa0.04,', 'of', 'a']
+    """
+    return _TOGETHER.sub(lambda statistic: statistic[0].replace(" ", "\u00a0"), text)
 
 
 def heading_pieces(header: Sequence[str]) -> list[list[tuple[str, bool]]]:
@@ -133,14 +173,33 @@ def with_minus(text: str) -> str:
 
 
 def signed_cell(cell: str, numeric: bool) -> str:
-    """A table's cell with minus signs where it holds numbers alone; ids and labels keep their hyphens.
+    """A table's cell with minus signs where it holds numbers alone, and in differences of labels.
+
+    The hyphens of ids and labels stay.
 
     Examples
     --------
     >>> signed_cell("-0.31 (0.12)", True), signed_cell("id -7", True), signed_cell("-7", False)
     ('−0.31 (0.12)', 'id -7', '-7')
+    >>> signed_cell("slow-in - fast", False)
+    'slow-in − fast'
     """
-    return with_minus(cell) if numeric and not _LETTER.search(cell) else cell
+    if not numeric:
+        indent = len(cell) - len(cell.lstrip(" "))
+        return "\u00a0" * indent + cell[indent:].replace(" - ", " − ")
+    return cell if _LETTER.search(cell) else with_minus(cell)
+
+
+def cell_pieces(cell: str, numeric: bool) -> list[tuple[str, bool]]:
+    """A table's cell in pieces: in a column of numbers it may hold a statistic.
+
+    Examples
+    --------
+    >>> cell_pieces("r = -.31", True), cell_pieces("F = 3", False)
+    ([('r', True), (' = −.31', False)], [('F = 3', False)])
+    """
+    text = with_minus(cell) if numeric and _SYMBOL.search(cell) else signed_cell(cell, numeric)
+    return _split(text, _SYMBOL) if numeric else [(text, False)]
 
 
 def _split(text: str, symbols: re.Pattern[str]) -> list[tuple[str, bool]]:

@@ -14,7 +14,7 @@ from analysis.report.choice_tables import abilities_table, contrasts_table, fact
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, left_out, study_data
-from analysis.report.numbers import apa_p, fixed, p_value
+from analysis.report.numbers import apa_p, fixed, p_value, share, with_minus
 from analysis.report.r_models import pairs_files
 from experiments.declaration.experiment import Experiment
 from table_files import counted
@@ -259,7 +259,7 @@ def pairs_table(findings: Findings, name: str, synthetic: bool) -> Table:
         (f"{p.first} - {p.second}", str(p.n), str(p.first_chosen), str(p.second_chosen), str(p.ties))
         for p in findings.pairs
     )
-    header = ("Pair: first - second", "n", "First", "Second", "Tied")
+    header = ("Pair: first − second", "Answers", "First", "Second", "Tied")
     title = caption("Choices in each pair", name, synthetic)
     return Table("pair-choices", title, header, rows, 1, (), folded=len(rows) > 24)
 
@@ -275,12 +275,12 @@ def checks_table(findings: Findings, result: PairsResult, name: str, synthetic: 
         rows.append(
             (
                 "Advantage of the left (first) side",
-                f"{fixed(side.estimate, 3)} (SE {fixed(side.se, 3)})",
+                with_minus(f"{fixed(side.estimate, 3)} (SE = {fixed(side.se, 3)})"),
                 p_value(side.p),
             )
         )
     if result.tie_probability_max is not None:
-        rows.append(("Probability of a tie between equals", fixed(result.tie_probability_max, 3), ""))
+        rows.append(("Probability of a tie between equals", share(result.tie_probability_max), ""))
     for kind in ("weak", "moderate", "strong"):
         broken = getattr(triples, f"{kind}_violations")
         rows.append((f"Triples against {kind} transitivity", f"{broken} of {triples.triples}", ""))

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.plans.plan import PlanRows
-from analysis.report.choice_tables import interval_text, plane_tables
+from analysis.report.choice_tables import interval_text, plane_decimals, plane_tables
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, left_out, study_data
-from analysis.report.numbers import fixed
+from analysis.report.numbers import fixed, share
 from analysis.report.threshold_contents import ADAPTIVE, compared_by, difference_sentence, differences_table
 from analysis.thresholds.plane_people import PlanesResult
 from experiments.declaration.threshold import threshold_of
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 METHODS = (
     "P(x, z) = guess + (1 - guess - lapse) F((x - t - b (z - z0)) / s), F the normal distribution function, "
-    "x the {first}, z the {second}, with the declared guess rate {guess:g} and lapse rate {lapse:g}, by "
+    "x the {first}, z the {second}, with the declared guess rate {guess} and lapse rate {lapse}, by "
     "maximum likelihood: the threshold t at the middle z0 moves by the tilt b along z. Intervals are 95% "
     "profiles of the likelihood. 'fit p' tests the line and the shape against the proportions at every "
     "stimulus. {rest}"
@@ -74,8 +74,8 @@ def contents_of(
         methods=METHODS.format(
             first=variables[0],
             second=variables[1],
-            guess=trial.task.guess,
-            lapse=trial.lapse,
+            guess=f"{trial.task.guess:g}".replace("0.", ".", 1),
+            lapse=f"{trial.lapse:g}".replace("0.", ".", 1),
             rest=(POPULATION if merged and merged.population else "")
             + (AVERAGES if merged and merged.means else "")
             + compared_by(differences)
@@ -131,19 +131,20 @@ def _line_in_words(result: PlanesResult, second: str) -> str:
         else (pooled, "over all trials")
     )
     low, high = fit.tilt_ci.low, fit.tilt_ci.high
+    at, by = plane_decimals(result)
     # A missing end is open: the likelihood does not bound it on this side.
     known = (low is not None and low > 0) or (high is not None and high < 0)
     verdict = f"so that it depends on {second}" if known else "an interval that includes 0"
     return (
-        f"the threshold {of} was {fixed(fit.threshold, 3)}, 95% CI {interval_text(fit.threshold_ci)}, at "
-        f"{second} = {pooled.middle:g}. Its tilt, the change per unit of {second}, was {fixed(fit.tilt, 3)}, "
-        f"95% CI {interval_text(fit.tilt_ci)}, {verdict}."
+        f"the threshold {of} was {fixed(fit.threshold, at)}, 95% CI {interval_text(fit.threshold_ci, at)}, "
+        f"at {second} = {pooled.middle:g}. Its tilt, the change per unit of {second}, was "
+        f"{fixed(fit.tilt, by)}, 95% CI {interval_text(fit.tilt_ci, by)}, {verdict}."
     )
 
 
 def _shares(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], name: str, synthetic: bool) -> Table:
     rows = tuple(
-        (fit.label, f"{x:g}", f"{z:g}", f"{n:.0f}", f"{k:.0f}", fixed(k / n))
+        (fit.label, f"{x:g}", f"{z:g}", f"{n:.0f}", f"{k:.0f}", share(k / n, 2))
         for fit in fits
         for x, z, n, k in zip(*fit.points, strict=True)
     )

@@ -19,7 +19,7 @@ from analysis.report.choice_tables import (
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, left_out, study_data
-from analysis.report.numbers import apa_p, decimals, fixed, interval, p_value
+from analysis.report.numbers import apa_p, decimals, fixed, interval, p_value, share
 from analysis.report.r_models import threshold_files
 from analysis.thresholds.likelihood import function
 from analysis.thresholds.people import ThresholdsResult
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     from analysis.thresholds.series import Difference, SeriesFit
 
 METHODS = (
-    "P(x) = guess + (1 - guess - lapse) F(x), F {function}, with the declared guess rate {guess:g} and "
-    "lapse rate {lapse:g}, by maximum likelihood; the threshold is where F is one half. Intervals are 95% "
+    "P(x) = guess + (1 - guess - lapse) F(x), F {function}, with the declared guess rate {guess} and "
+    "lapse rate {lapse}, by maximum likelihood; the threshold is where F is one half. Intervals are 95% "
     "profiles of the likelihood. {rest}"
 )
 AVERAGES = (
@@ -89,8 +89,8 @@ def contents_of(
         ),
         methods=METHODS.format(
             function=trial.function,
-            guess=trial.task.guess,
-            lapse=trial.lapse,
+            guess=f"{trial.task.guess:g}".replace("0.", ".", 1),
+            lapse=f"{trial.lapse:g}".replace("0.", ".", 1),
             rest=(AVERAGES if merged.means else "")
             + (POOLED if people > 1 else "")
             + compared_by(differences)
@@ -168,7 +168,7 @@ def degrees(df: float) -> str:
 def shares_table(fits: "Sequence[SeriesFit]", name: str, synthetic: bool) -> Table:
     """Trials and answers at each stimulus."""
     rows = tuple(
-        (fit.label, f"{x:g}", f"{n:.0f}", f"{k:.0f}", fixed(k / n))
+        (fit.label, f"{x:g}", f"{n:.0f}", f"{k:.0f}", share(k / n, 2))
         for fit in fits
         for x, n, k in zip(fit.trials.x, fit.trials.n, fit.trials.k, strict=True)
     )
@@ -212,10 +212,10 @@ def difference_sentence(d: "Difference") -> str:
     """What a comparison of two series says."""
     verdict = "differed" if d.p_holm < SIGNIFICANCE else "did not differ significantly"
     # The brackets follow a p, so only the number is repeated.
-    corrected = apa_p(d.p_holm).removeprefix("p ")
+    corrected = apa_p(d.p_holm).removeprefix("p ").removeprefix("= ")
     return (
         f"{d.what.capitalize()}s {verdict} between {d.first} and {d.second}, "
-        f"t({degrees(d.df)}) = {fixed(d.t)}, {apa_p(d.p)} (after Holm {corrected})."
+        f"t({degrees(d.df)}) = {fixed(d.t)}, {apa_p(d.p)} ({corrected} after Holm's correction)."
     )
 
 

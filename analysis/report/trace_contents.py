@@ -8,7 +8,7 @@ from analysis.plans.result import labels_of
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, left_out
-from analysis.report.numbers import apa_p, fixed, interval, p_value
+from analysis.report.numbers import apa_p, fixed, interval, p_value, share
 from analysis.traces import LagResult, MeanTrace
 from table_files import counted
 
@@ -84,7 +84,7 @@ def tables(prepared: PlanRows, traces: Sequence[MeanTrace], lag: LagResult | Non
             str(lag.people),
             fixed(lag.lag_s),
             interval((lag.lag_low_s, lag.lag_high_s)),
-            fixed(lag.r, 3),
+            share(lag.r),
             p_value(lag.p),
         )
         title = caption("Lag of ratings after blinks", name, synthetic)
@@ -108,13 +108,13 @@ def sentences(lag: LagResult | None, traces: Sequence[MeanTrace]) -> tuple[str, 
     if lag.p >= SIGNIFICANCE:
         return (
             "Ratings did not follow blinks: the greatest correlation of their change with blinks, "
-            f"{fixed(lag.r, 3)} at {fixed(lag.lag_s)} s, did not exceed that of random shifts "
+            f"r = {share(lag.r, 2)} at {fixed(lag.lag_s)} s, did not exceed that of random shifts "
             f"({apa_p(lag.p)}).",
         )
     return (
         f"Ratings changed {fixed(lag.lag_s)} s after blinks, 95% CI [{fixed(lag.lag_low_s)}, "
-        f"{fixed(lag.lag_high_s)}]; at this lag, their change correlated {fixed(lag.r, 3)} with blinks, "
-        f"more than for random shifts ({apa_p(lag.p)}).",
+        f"{fixed(lag.lag_high_s)}]; at this lag, their change correlated with blinks, "
+        f"r = {share(lag.r, 2)}, more than for random shifts ({apa_p(lag.p)}).",
     )
 
 

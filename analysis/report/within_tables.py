@@ -12,7 +12,7 @@ from analysis.report.numbers import (
     p_value,
     share,
     share_interval,
-    sum_text,
+    sum_digits,
 )
 from analysis.within.effects import Effect
 from analysis.within.homogeneity import box_test, levene_tests
@@ -48,11 +48,13 @@ def corrected_df(test: UnivariateTest) -> str:
 
 def univariate_table(analysis: Analysis) -> Table:
     """Univariate tests with uncorrected df."""
+    sums = [(e.univariate.ss, e.univariate.ss_error) for e in analysis.anova.effects]
+    digits = sum_digits(one for pair in sums for one in pair)
     rows = tuple(
         (
             analysis.labels.effect(e.factors),
-            sum_text(e.univariate.ss),
-            sum_text(e.univariate.ss_error),
+            fixed(e.univariate.ss, digits),
+            fixed(e.univariate.ss_error, digits),
             f"{e.univariate.df_effect}, {e.univariate.df_error}",
             f_text(e.univariate.f_value),
             p_value(e.univariate.p_value),
@@ -157,10 +159,11 @@ def effect_size_table(analysis: Analysis) -> Table:
         for e in analysis.anova.effects
     )
     notes = (
-        "ηₚ², ω²ₚ (partial), ηG² (generalized): univariate test; the interval uses the Greenhouse-Geisser "
-        "df. mv: ηₚ² of the multivariate test. Intervals: 95%, noncentral F (Steiger, 2004).",
+        "ηₚ² and ωₚ² (partial) and generalized (gen.) η² are of the univariate test; the interval uses the "
+        "Greenhouse-Geisser df. mv: ηₚ² of the multivariate test. Intervals: 95%, noncentral F with the "
+        "method of Steiger (2004).",
     )
-    header = ("Effect", "ηₚ²", "95% CI", "ηG²", "ω²ₚ", "mv ηₚ²", "95% CI")
+    header = ("Effect", "ηₚ²", "95% CI", "gen. η²", "ωₚ²", "mv ηₚ²", "95% CI")
     return Table("effects", title_of(analysis, "Effect sizes"), header, rows, 1, notes)
 
 
@@ -322,7 +325,7 @@ def paper_table(analysis: Analysis) -> Table:
         rows += _factor_rows(analysis, factor, multivariate, spread)
     rows += _interaction_rows(analysis, multivariate)
     univariate = "univariate, df and p with the Greenhouse-Geisser correction"
-    kind = "multivariate, df (q, N - q)" if multivariate else univariate
+    kind = "multivariate, df (q, N − q)" if multivariate else univariate
     notes = [
         f"N = {analysis.n_participants}. F: {kind}. SE: standard error across participants.",
         *_pair_notes(analysis),

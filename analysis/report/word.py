@@ -1,17 +1,35 @@
 """The report as a Word file, for those who write there; the same contents give the same bytes."""
 
 import re
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from typing import TYPE_CHECKING
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from analysis.report.contents import Contents, DrawnPart, Picture, Section
-from analysis.report.formats import Table, widths_cm
-from analysis.report.numbers import heading_pieces, pieces, signed_cell, with_minus
+from analysis.report.contents import (
+    Contents,
+    DrawnPart,
+    Mention,
+    Picture,
+    Section,
+    cited_works,
+    mentions,
+    numbers_of,
+)
+from analysis.report.formats import Table, as_sentence, widths_cm
+from analysis.report.numbers import (
+    cell_pieces,
+    heading_pieces,
+    note_pieces,
+    pieces,
+    unbroken,
+    with_minus,
+)
 
 if TYPE_CHECKING:
     from docx.document import Document
+    from docx.oxml.xmlchemy import BaseOxmlElement
     from docx.table import Table as Grid
     from docx.table import _Cell, _Row
     from docx.text.paragraph import Paragraph
@@ -22,8 +40,9 @@ EPOCH = datetime(2000, 1, 1, tzinfo=UTC)
 """What the file says of when it was made: a clock's time would differ from run to run."""
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
 WIDTH_CM = 16.0
-TABLE_POINTS = 8
-WHOLE = 14
+FONT = "Times New Roman"
+TABLE_POINTS = 9
+WHOLE = 26
 """A table of more rows may be broken over pages; of its first rows one stays with the head."""
 _CONTROL = re.compile("[\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\ufffe\\uffff]")
 
@@ -48,7 +67,10 @@ def as_docx(contents: Contents, parts: tuple[DrawnPart, ...], version: str) -> b
     import docx
 
     document = docx.Document()
+    numbers = numbers_of(parts, contents.evidence)
     _set_margins(document)
+    _set_styles(document)
+    _number_pages(document)
     properties = document.core_properties
     properties.title, properties.author, properties.comments = _sayable(contents.title), "palpebra", ""
     properties.created = properties.modified = EPOCH
@@ -60,11 +82,12 @@ def as_docx(contents: Contents, parts: tuple[DrawnPart, ...], version: str) -> b
         _add_lines(document, "In brief", part.brief, part.title)
     _add_lines(document, "Exclusions and decisions", (*contents.left_out, *contents.decisions))
     for part in parts:
-        _add_part(document, part, contents.synthetic)
+        _add_part(document, part, contents.synthetic, numbers)
     if contents.evidence:
-        _add_section(document, contents.evidence, 1, contents.synthetic)
+        _add_section(document, contents.evidence, 1, contents.synthetic, numbers)
     document.add_heading("Method", 1)
-    document.add_paragraph(_sayable(contents.methods))
+    _add_noted(document, contents.methods)
+    _add_references(document, cited_works(parts, contents.methods))
     document.add_paragraph(f"Made by palpebra {version}.")
     return _same_bytes(document)
 
@@ -76,6 +99,41 @@ def _set_margins(document: "Document") -> None:
     section = document.sections[0]
     beside = Length(((section.page_width or Cm(21.6)) - Cm(WIDTH_CM)) // 2)
     section.left_margin = section.right_margin = beside
+
+
+def _set_styles(document: "Document") -> None:
+    """The type of a manuscript in APA style: black Times, bold heads, plain captions."""
+    from docx.enum.style import WD_STYLE_TYPE
+    from docx.enum.text import WD_ALIGN_PARAGRAPH
+    from docx.oxml.ns import qn
+    from docx.shared import Pt, RGBColor
+
+    sizes = {"Normal": 11, "Title": 14, "Heading 1": 12, "Heading 2": 11, "Caption": 11}
+    sizes |= {"Intense Quote": 11, "Body Text 3": 9}
+    for name, points in sizes.items():
+        style = document.styles[name]
+        fonts = style.element.get_or_add_rPr().get_or_add_rFonts()
+        # a font of the theme goes before one by name
+        for attribute in ("asciiTheme", "hAnsiTheme", "eastAsiaTheme", "cstheme"):
+            fonts.attrib.pop(qn(f"w:{attribute}"), None)
+        style.font.name, style.font.size, style.font.color.rgb = FONT, Pt(points), RGBColor(0, 0, 0)
+        style.font.bold = name not in ("Normal", "Caption", "Body Text 3")
+        style.font.italic = False
+        for border in style.element.xpath("./w:pPr/w:pBdr"):
+            border.getparent().remove(border)
+    cells = document.styles.add_style("Table Cell", WD_STYLE_TYPE.PARAGRAPH)
+    cells.base_style = document.styles["Normal"]
+    cells.font.size, cells.paragraph_format.space_after = Pt(TABLE_POINTS), Pt(0)
+    cells.paragraph_format.line_spacing = 1.0
+    document.styles["Title"].paragraph_format.alignment = WD_ALIGN_PARAGRAPH.CENTER
+
+
+def _number_pages(document: "Document") -> None:
+    from docx.enum.text import WD_ALIGN_PARAGRAPH
+
+    paragraph = document.sections[0].header.paragraphs[0]
+    paragraph.alignment = WD_ALIGN_PARAGRAPH.RIGHT
+    _add_field(paragraph, " PAGE ", "1")
 
 
 def _sayable(text: str) -> str:
@@ -92,42 +150,66 @@ def _add_lines(document: "Document", heading: str, lines: tuple[str, ...], of: s
 
 
 def _add_sentence(document: "Document", text: str) -> None:
-    _add_runs(document.add_paragraph(style="List Bullet"), pieces(with_minus(_sayable(text))))
+    _add_runs(
+        document.add_paragraph(style="List Bullet"), pieces(unbroken(with_minus(_sayable(as_sentence(text)))))
+    )
 
 
-def _add_runs(paragraph: "Paragraph", split: list[tuple[str, bool]], points: float | None = None) -> None:
+def _add_noted(document: "Document", text: str) -> "Paragraph":
+    """A paragraph about statistics, their symbols in italics."""
+    paragraph = document.add_paragraph()
+    _add_runs(paragraph, note_pieces(unbroken(with_minus(_sayable(text)))))
+    return paragraph
+
+
+def _add_references(document: "Document", works: list[list[tuple[str, bool]]]) -> None:
+    from docx.shared import Cm
+
+    if works:
+        document.add_heading("References", 1)
+    for work in works:
+        paragraph = document.add_paragraph()
+        paragraph.paragraph_format.left_indent = Cm(1.27)
+        paragraph.paragraph_format.first_line_indent = Cm(-1.27)
+        _add_runs(paragraph, work)
+
+
+def _add_runs(paragraph: "Paragraph", split: list[tuple[str, bool]]) -> None:
     """Write pieces of text, symbols of statistics in italics."""
-    from docx.shared import Pt
-
     for piece, is_symbol in split:
-        run = paragraph.add_run(piece)
-        run.italic = is_symbol or None
-        run.font.size = None if points is None else Pt(points)
+        paragraph.add_run(piece).italic = is_symbol or None
 
 
-def _add_part(document: "Document", part: DrawnPart, synthetic: bool) -> None:
+def _add_part(document: "Document", part: DrawnPart, synthetic: bool, numbers: dict[Mention, int]) -> None:
     level = 2 if part.title else 1
     if part.title:
         document.add_heading(_sayable(part.title), 1)
     document.add_heading("Results", level)
+    _add_mentions(document.add_paragraph(), mentions([part.first], part.pictures), numbers)
     _add_table(document, part.first)
     for picture in part.pictures:
         _add_picture(document, picture, synthetic)
     document.add_heading("In sentences", level)
     for sentence in part.sentences:
         _add_sentence(document, sentence)
-    document.add_paragraph(part.self_check)
+    _add_noted(document, part.self_check)
     if part.tables:
         document.add_heading("Every test", level)
+        _add_mentions(document.add_paragraph(), mentions(part.tables, ()), numbers)
         for table in part.tables:
             _add_table(document, table)
     for section in part.sections:
-        _add_section(document, section, level, synthetic)
+        _add_section(document, section, level, synthetic, numbers)
 
 
-def _add_section(document: "Document", section: Section, level: int, synthetic: bool) -> None:
+def _add_section(
+    document: "Document", section: Section, level: int, synthetic: bool, numbers: dict[Mention, int]
+) -> None:
     document.add_heading(_sayable(section.title), level)
-    _add_runs(document.add_paragraph(), pieces(with_minus(_sayable(section.text))))
+    paragraph = _add_noted(document, section.text)
+    if section.tables or section.pictures:
+        paragraph.add_run(" ")
+        _add_mentions(paragraph, mentions(section.tables, section.pictures), numbers)
     for picture in section.pictures:
         _add_picture(document, picture, synthetic)
     for table in section.tables:
@@ -139,52 +221,77 @@ def _add_picture(document: "Document", picture: Picture, synthetic: bool) -> Non
     from docx.shared import Cm
 
     number = len(document.inline_shapes) + 1
-    shape = document.add_picture(BytesIO(picture.png), width=Cm(WIDTH_CM))
     caption = _sayable(picture.caption) + (" (synthetic data)" if synthetic else "")
     shown = _sayable(picture.alt).removesuffix(".") + "." + (" Synthetic data." if synthetic else "")
+    _add_caption(document, "Figure", number, caption)
+    shape = document.add_picture(BytesIO(picture.png), width=Cm(WIDTH_CM))
     properties = shape._inline.docPr
     properties.set("name", f"Figure {number}")
     properties.set("title", caption)
     properties.set("descr", shown)
     document.paragraphs[-1].paragraph_format.keep_with_next = True
-    _add_caption(document, "Figure", number, caption, keep_with_next=True)
-    said = shown.removeprefix(f"{_sayable(picture.caption)}: ")
-    _add_note(document, said[:1].upper() + said[1:])
+    _add_note(document, _sayable(picture.note) + (" Synthetic data." if synthetic else ""))
 
 
-def _add_caption(document: "Document", label: str, number: int, text: str, keep_with_next: bool) -> None:
-    """A caption with a number that Word counts (a SEQ field), so that it can be referred to and updated."""
+def _add_caption(document: "Document", label: str, number: int, text: str) -> None:
+    """A number in bold that Word counts (a SEQ field), and the title in italics in the next line.
+
+    A bookmark around the number lets the text refer to it.
+    """
     paragraph = document.add_paragraph(style="Caption")
-    paragraph.add_run(f"{label} ")
-    for kind in ("begin", "instruction", "separate", "number", "end"):
-        run = paragraph.add_run(str(number) if kind == "number" else "")
+    paragraph.add_run(f"{label} ").bold = True
+    mark = {"id": str(2 * number + (label == "Figure")), "name": f"{label}{number}"}
+    _append(paragraph._p, "w:bookmarkStart", "", **mark)
+    for run in _add_field(paragraph, f" SEQ {label} \\* ARABIC ", str(number)):
+        run.bold = True
+    _append(paragraph._p, "w:bookmarkEnd", "", id=mark["id"])
+    paragraph.add_run().add_break()
+    paragraph.add_run(text).italic = True
+    paragraph.paragraph_format.keep_with_next = True
+
+
+def _add_mentions(paragraph: "Paragraph", said: Sequence[str | Mention], numbers: dict[Mention, int]) -> None:
+    """A sentence whose numbers of tables and figures follow their captions (REF fields)."""
+    for piece in said:
+        if isinstance(piece, Mention):
+            number = numbers[piece]
+            _add_field(paragraph, f" REF {piece.noun}{number} \\h ", str(number))
+        else:
+            paragraph.add_run(piece)
+
+
+def _add_field(paragraph: "Paragraph", instruction: str, shown: str) -> list["Run"]:
+    """A field that Word computes, with what it shows until then."""
+    runs = []
+    for kind in ("begin", "instruction", "separate", "shown", "end"):
+        run = paragraph.add_run(shown if kind == "shown" else "")
         if kind == "instruction":
-            _append(run, "w:instrText", f" SEQ {label} \\* ARABIC ")
-        elif kind != "number":
-            _append(run, "w:fldChar", "", fldCharType=kind)
-    paragraph.add_run(f". {text}")
-    paragraph.paragraph_format.keep_with_next = keep_with_next
+            _append(run._r, "w:instrText", instruction)
+        elif kind != "shown":
+            _append(run._r, "w:fldChar", "", fldCharType=kind)
+        runs.append(run)
+    return runs
 
 
-def _append(run: "Run", name: str, text: str, **attributes: str) -> None:
-    """An element inside a run that python-docx has no name for."""
+def _append(parent: "BaseOxmlElement", tag: str, text: str, **attributes: str) -> None:
+    """An element that python-docx has no name for, as the last one of another."""
     from docx.oxml import OxmlElement
     from docx.oxml.ns import qn
 
-    element = OxmlElement(name)
+    element = OxmlElement(tag)
     if text:
         element.text = text
         element.set(qn("xml:space"), "preserve")
     for key, value in attributes.items():
         element.set(qn(f"w:{key}"), value)
-    run._r.append(element)
+    parent.append(element)
 
 
 def _add_note(document: "Document", text: str) -> None:
     """A note under a table or a figure, as APA has it."""
     paragraph = document.add_paragraph(style="Body Text 3")
     paragraph.add_run("Note. ").italic = True
-    _add_runs(paragraph, pieces(with_minus(text)))
+    _add_runs(paragraph, note_pieces(unbroken(with_minus(text))))
 
 
 def _describe(grid: "Grid", table: Table) -> None:
@@ -206,24 +313,46 @@ def _set_property(grid: "Grid", name: str, value: str) -> None:
 
 def _add_table(document: "Document", table: Table) -> None:
     number = len(document.tables) + 1
-    _add_caption(document, "Table", number, _sayable(table.title), keep_with_next=True)
-    grid = document.add_table(rows=1 + len(table.rows), cols=len(table.header), style="Light List")
+    _add_caption(document, "Table", number, _sayable(table.title))
+    grid = document.add_table(rows=1 + len(table.rows), cols=len(table.header))
     head = heading_pieces([_sayable(text) for text in table.header])
     body = [
-        [
-            [(signed_cell(_sayable(text), position >= table.text_columns), False)]
-            for position, text in enumerate(row)
-        ]
+        [cell_pieces(_sayable(text), position >= table.text_columns) for position, text in enumerate(row)]
         for row in table.rows
     ]
     for cells, row in zip(grid.rows, (head, *body), strict=True):
         for position, (cell, split) in enumerate(zip(cells.cells, row, strict=True)):
             _fill(cell, split, right=position >= table.text_columns)
+    _rule(grid)
     _lay_out(grid, widths_cm(table, WIDTH_CM), bool(table.notes))
     _describe(grid, table)
     if table.notes:
-        _add_note(document, _sayable(" ".join(table.notes)))
+        _add_note(document, _sayable(table.note))
     document.add_paragraph()
+
+
+def _rule(grid: "Grid") -> None:
+    """Rules above and below the head and below the last row, and none between columns."""
+    from docx.oxml import OxmlElement
+    from docx.oxml.ns import qn
+
+    def border(parent: "BaseOxmlElement", side: str, eighths: str) -> None:
+        values = {"val": "single", "sz": eighths, "space": "0", "color": "000000"}
+        _append(parent, f"w:{side}", "", **values)
+
+    around = OxmlElement("w:tblBorders")
+    border(around, "top", "8")
+    border(around, "bottom", "8")
+    margins = OxmlElement("w:tblCellMar")
+    for side in ("left", "right"):
+        _append(margins, f"w:{side}", "", w="70", type="dxa")
+    look = grid._tbl.tblPr.find(qn("w:tblLook"))
+    look.addprevious(around)
+    look.addprevious(margins)
+    for cell in grid.rows[0].cells:
+        below = OxmlElement("w:tcBorders")
+        border(below, "bottom", "4")
+        cell._tc.get_or_add_tcPr().append(below)
 
 
 def _lay_out(grid: "Grid", widths: list[float], noted: bool) -> None:
@@ -256,7 +385,8 @@ def _fill(cell: "_Cell", split: list[tuple[str, bool]], right: bool) -> None:
     from docx.enum.text import WD_ALIGN_PARAGRAPH
 
     paragraph = cell.paragraphs[0]
-    _add_runs(paragraph, split, TABLE_POINTS)
+    paragraph.style = "Table Cell"
+    _add_runs(paragraph, split)
     if right:
         paragraph.alignment = WD_ALIGN_PARAGRAPH.RIGHT
 

@@ -1,17 +1,29 @@
 """One report: HTML, Markdown, Word and LaTeX, tables for LaTeX, figures, and the results as JSON."""
 
+from collections.abc import Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from analysis.report.contents import Contents, DrawnPart, Part, Progress
-from analysis.report.formats import as_markdown
+from analysis.report.contents import (
+    Contents,
+    DrawnPart,
+    Mention,
+    Part,
+    Picture,
+    Progress,
+    cited_works,
+    mentions,
+    numbers_of,
+)
+from analysis.report.formats import Table, as_markdown, as_sentence
 from analysis.report.latex import NEEDS, as_document, as_latex
-from analysis.report.numbers import heading_pieces, pieces, signed_cell, with_minus
+from analysis.report.numbers import cell_pieces, heading_pieces, note_pieces, pieces, with_minus
 from analysis.report.word import as_docx
 from experiments.errors import InputError
 from experiments.files import json_text, whole_file
+from table_files import counted
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -41,8 +53,10 @@ def _environment() -> "Environment":
     )
     environment.filters["markdown_table"] = as_markdown
     environment.filters["italics"] = lambda text: _in_italics(pieces(with_minus(text)))
+    environment.filters["sentence"] = as_sentence
+    environment.filters["note"] = lambda text: _in_italics(note_pieces(with_minus(text)))
     environment.filters["headings"] = lambda header: [_in_italics(head) for head in heading_pieces(header)]
-    environment.filters["signed_cell"] = signed_cell
+    environment.filters["cell"] = lambda text, numeric: _in_italics(cell_pieces(text, numeric))
     return environment
 
 
@@ -79,8 +93,8 @@ def write_report(
     files["tables.tex"] = _latex(contents, parts).encode()
     files["report.tex"] = as_document(contents, parts, version("palpebra")).encode()
     files["results.json"] = json_text(contents.numbers).encode()
-    files["report.md"] = _render("report.md.j2", contents, parts).encode()
-    files["report.html"] = _render("report.html.j2", contents, parts).encode()
+    files["report.md"] = render_report("report.md.j2", contents, parts).encode()
+    files["report.html"] = render_report("report.html.j2", contents, parts).encode()
     files["report.docx"] = as_docx(contents, parts, version("palpebra"))
     for name, content in files.items():
         with whole_file(folder / name) as temporary:
@@ -131,11 +145,42 @@ def self_check(said: tuple[str, ...]) -> str:
         )
     alone = len(result.unread)
     more = f"; {alone} more cannot be recomputed from the sentence" if alone else ""
+    read = counted(len(result.statistics), "statistic")
     return (
-        f"Checked by analysis check-paper: {len(result.statistics)} statistics read in these sentences, "
+        f"Checked by analysis check-paper: {read} read in these sentences, "
         f"{result.n_checked} recomputed from their df, {result.n_wrong} inconsistent{more}."
     )
 
 
-def _render(template: str, contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
-    return fill_template(template, contents=contents, parts=parts, version=version("palpebra"))
+def render_report(template: str, contents: Contents, parts: tuple[DrawnPart, ...]) -> str:
+    """The report as a page or as Markdown, by the name of its template."""
+    from markupsafe import Markup
+
+    numbers = numbers_of(parts, contents.evidence)
+    is_page = template.endswith(".html.j2")
+
+    def number(noun: str, key: str) -> str:
+        return f"{noun} {numbers[Mention(noun, key)]}"
+
+    def see(tables: Sequence[Table], pictures: Sequence[Picture] = ()) -> str:
+        """Which tables and figures to look at, on the page with links."""
+        link = Markup('<a href="#{0}">{1}</a>') if is_page else "{1}"
+        return (Markup() if is_page else "").join(
+            link.format(one.key, numbers[one]) if isinstance(one, Mention) else one
+            for one in mentions(tables, pictures)
+        )
+
+    works = cited_works(parts, contents.methods)
+    if is_page:
+        references: list[str] = [_in_italics(work) for work in works]
+    else:
+        references = ["".join(f"*{piece}*" if wide else piece for piece, wide in work) for work in works]
+    return fill_template(
+        template,
+        contents=contents,
+        parts=parts,
+        number=number,
+        see=see,
+        references=references,
+        version=version("palpebra"),
+    )

@@ -97,7 +97,9 @@ def test_the_report_shows_table_and_figure(tmp_path, rows) -> None:
     assert "Multiverse of exclusions" in page
     assert "Effects by permutation and by aligned ranks" in page
     assert "4 analyses" in page
-    assert "![Multiverse" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "Multiverse of exclusions (synthetic data)](" in (tmp_path / "out" / "report.md").read_text(
+        encoding="utf-8"
+    )
 
 
 def test_without_rules_there_is_nothing_to_vary(tmp_path, rows) -> None:

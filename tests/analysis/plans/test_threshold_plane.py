@@ -163,8 +163,9 @@ def test_the_report_says_how_the_threshold_tilts_with_its_interval(within: Conte
         assert fit["people"] == 6
         assert fit["tilt_ci"]["low"] < TILT < fit["tilt_ci"]["high"]
         [sentence] = [said for said in within.parts[0].sentences if said.startswith(f"{label}: ")]
-        interval = f"[{fixed(fit['tilt_ci']['low'], 3)}, {fixed(fit['tilt_ci']['high'], 3)}]"
-        assert f"was {fixed(fit['tilt'], 3)}, 95% CI {interval}, so that it depends on Character" in sentence
+        low, high = (fixed(fit["tilt_ci"][end], 0) for end in ("low", "high"))
+        said = f"was {fixed(fit['tilt'], 0)}, 95% CI [{low}, {high}], so that it depends on Character"
+        assert said in sentence
     parameters = within.parts[0].tables[0]
     assert [row[0] for row in parameters.rows[:2]] == [
         f"{label}, 6 people" for label in within.numbers["labels"].values()

@@ -29,7 +29,7 @@ def has_tex() -> bool:
     """Whether pdflatex is here with the packages that a report loads."""
     if shutil.which("pdflatex") is None or shutil.which("kpsewhich") is None:
         return False
-    call = ["kpsewhich", "float.sty", "booktabs.sty"]
+    call = ["kpsewhich", "caption.sty", "booktabs.sty"]
     asked = subprocess.run(call, capture_output=True, text=True, check=False)
     return len(asked.stdout.split()) == 2
 
@@ -121,12 +121,44 @@ def test_a_report_is_a_whole_document_with_captions_labels_and_figures(report_fo
     assert r"\ref{fig:figure-9}" in text
     assert r"\includegraphics[width=.95\linewidth]{figure-9.png}" in text
     assert r"\begin{longtable}" in text
-    assert re.search(r"\\textit\{F\}\(\d+, \d+\) = ", text)
+    assert re.search(r"\\textit\{F\}\(\d+,~\d+\)~=~", text)
+
+
+def test_captions_are_above_and_notes_below(report_folder) -> None:
+    text = (report_folder / "report.tex").read_text(encoding="utf-8")
+    for body in re.findall(r"\\begin\{figure\}(.*?)\\end\{figure\}", text, re.DOTALL):
+        assert body.index(r"\caption{") < body.index(r"\includegraphics") < body.index(r"\textit{Note.}")
+    first = re.findall(r"\\begin\{table\}.*?\\end\{table\}", text, re.DOTALL)[0]
+    assert first.index(r"\caption{") < first.index(r"\toprule") < first.index(r"\textit{Note.} \textit{N}")
+    assert "|" not in "".join(re.findall(r"\\begin\{(?:tabular|longtable)\}\{(.*)\}\n", text))
+    assert "labelsep=newline" in text
+
+
+def test_every_table_and_figure_is_mentioned(report_folder) -> None:
+    text = (report_folder / "report.tex").read_text(encoding="utf-8")
+    keys = re.findall(r"\\label\{([^}]*)\}", text)
+    said = re.sub(
+        r"\\ref\{tab:([^}]*)\} to \\ref\{tab:([^}]*)\}",
+        lambda two: " ".join(
+            rf"\ref{{{key}}}" for key in keys[keys.index(f"tab:{two[1]}") : keys.index(f"tab:{two[2]}") + 1]
+        ),
+        text,
+    )
+    assert set(re.findall(r"\\ref\{([^}]*)\}", said)) == set(keys)
+
+
+def test_an_indented_row_and_a_difference_are_set_as_such() -> None:
+    made = as_latex(Table("k", "t", ("a", "b"), (("  slow-in - fast", "r = -.3"),)))
+    assert r"~~slow-in \ensuremath{-} fast & \textit{r} = \ensuremath{-}.3 \\" in made
+    assert latex_text("ηₚ²") == r"\ensuremath{\eta}\ensuremath{_p^2}"
 
 
 @needs_tex
 def test_tex_sets_a_report(report_folder) -> None:
     assert "Undefined control sequence" not in compiled(report_folder)
+    log = compiled(report_folder)
+    assert "Overfull" not in log
+    assert "undefined" not in log
 
 
 def test_no_character_breaks_the_document(tmp_path) -> None:

@@ -19,7 +19,7 @@ from analysis.report.figures import draw, figures_of
 from analysis.report.formats import Table, as_markdown, as_text, wrap
 from analysis.report.json_output import as_data
 from analysis.report.latex import as_latex, latex_text
-from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_text
+from analysis.report.numbers import apa_p, fixed, interval, p_value, share, sum_digits
 from analysis.report.within_contents import contents_of, sentences
 from analysis.report.within_tables import all_tables, corrected_df, paper_table
 from analysis.report.write import self_check, write_report
@@ -194,11 +194,11 @@ def test_bayes_factors_are_next_to_the_planned_pairs(tmp_path) -> None:
         (share(-0.25), "-.250"),
         (fixed(-0.001), "0.00"),
         (interval((1.234, float("nan"))), "[1.23, –]"),
-        (sum_text(1234.5), "1235"),
+        (sum_digits([1234.5, 0.2]), 2),
         (fixed(71.75499999999998), "71.76"),
         (fixed(-0.125), "-0.13"),
         (fixed(1e30, 1), f"{1e30:.1f}"),
-        (sum_text(0.01234), "0.0123"),
+        (sum_digits([0.01234]), 5),
     ],
 )
 def test_numbers_are_printed_as_apa_has_them(made, text) -> None:
