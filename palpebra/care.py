@@ -12,7 +12,6 @@ import typer
 from experiments.command_line import EXTRAS, install_line
 from experiments.errors import InputError
 from experiments.files import existing_part
-from palpebra.conflicts import foreign_packages
 from palpebra.folders import Folder, data_folder, use_folder
 
 UPGRADE = "uv tool install --force NEW.whl    (NEW.whl: the file of the new version)"
@@ -31,8 +30,6 @@ def doctor(folder: Folder = None) -> None:
     Example: palpebra doctor
     """
     typer.echo(f"Palpebra {metadata.version('palpebra')}, data folder {_used(folder)}")
-    for name, place in foreign_packages().items():
-        typer.echo(f"package '{name}' comes from another project: {place}")
     for extra, modules in EXTRAS.items():
         missing = [module for module in modules if find_spec(module) is None]
         said = "installed" if not missing else f"not installed: {install_line(extra)}"

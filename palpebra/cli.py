@@ -6,8 +6,8 @@ from importlib import import_module, metadata
 
 from experiments.command_groups import lazy_app
 from experiments.command_line import run_privately
-from palpebra.conflicts import refuse_foreign_packages
 from palpebra.folders import DATA_VARIABLE, default_folder
+from palpebra.intact import refuse_broken_installation
 
 COMMANDS = {
     "start": (
@@ -75,5 +75,5 @@ def main() -> None:
 
 
 def _checked_app(**settings: object) -> object:
-    refuse_foreign_packages()
+    refuse_broken_installation()
     return app(**settings)

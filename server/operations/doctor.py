@@ -375,9 +375,7 @@ def pages(services: Services) -> Iterator[Finding]:
     """The pages are built."""
     for site in ("participant", "admin"):
         path = services.settings.frontend_folder / site / "index.html"
-        advice = (
-            "" if path.is_file() else "run: npm ci && npm run build (in the folder frontend), or `make run`"
-        )
+        advice = "" if path.is_file() else "run `make run` in the checkout, or install Palpebra again"
         said = "built" if path.is_file() else f"no {path}"
         yield Finding(f"{site} page", "ok" if path.is_file() else "failed", said, advice)
 

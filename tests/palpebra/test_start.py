@@ -13,8 +13,8 @@ import pytest
 from experiments.errors import InputError
 from palpebra import cli
 from palpebra.cli import with_start
-from palpebra.conflicts import refuse_foreign_packages
 from palpebra.folders import data_folder, free_port
+from palpebra.intact import refuse_broken_installation
 from palpebra.start import only_server_of
 from server.core.settings import Settings
 from tests.helpers.ports import free_port as unused_port
@@ -90,7 +90,7 @@ def test_package_of_another_project_is_named(tmp_path: Path, monkeypatch: pytest
     monkeypatch.delitem(sys.modules, "migrations", raising=False)
     expected = r"package 'migrations': expected Palpebra's, got the one in .*: uv tool install FILE\.whl$"
     with pytest.raises(InputError, match=expected):
-        refuse_foreign_packages()
+        refuse_broken_installation()
 
 
 def test_upgrade_backs_up_first_and_names_both(tmp_path: Path) -> None:

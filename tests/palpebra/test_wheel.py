@@ -152,3 +152,33 @@ def test_missing_extra_is_one_line_with_the_install_command(installed: Path, tmp
     assert done.stderr.count("\n") == 1
     assert done.stderr.startswith("error: this command needs the extra 'render'; install Palpebra with it: ")
     assert done.stderr.endswith("uv tool install 'FILE.whl[render]'\n")
+
+
+@pytest.mark.parametrize(
+    "missing",
+    ["palpebra/pages/admin/index.html", "migrations/versions/2026-11-22_archive.py", "server/core/db.py"],
+)
+def test_a_missing_file_is_one_line_and_nothing_is_created(
+    installed: Path, tmp_path: Path, missing: str
+) -> None:
+    (packages,) = installed.parent.glob("lib/python*/site-packages")
+    (packages / missing).rename(tmp_path / "away")
+    try:
+        for command in (["--no-browser", "--folder", tmp_path / "data"], ["doctor"]):
+            done = subprocess.run(
+                [installed / "palpebra", *command],
+                cwd=tmp_path,
+                env={"PATH": "/usr/bin:/bin", "HOME": str(tmp_path), "LANG": "C.UTF-8"},
+                capture_output=True,
+                text=True,
+                timeout=60,
+                check=False,
+            )
+            assert done.returncode == 2
+            assert done.stderr == (
+                f"error: the installation is damaged: {missing} is missing or has another size; install "
+                "Palpebra again: uv tool install --force FILE.whl\n"
+            )
+            assert not (tmp_path / "data").exists()
+    finally:
+        (tmp_path / "away").rename(packages / missing)

@@ -1,0 +1,62 @@
+"""Whether the installation is whole: every file is there, and none of another project hides one of ours."""
+
+import csv
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+
+from experiments.command_line import install_line
+from experiments.errors import InputError
+
+PACKAGES = ("server", "analysis", "experiments", "migrations", "table_files", "video_conversion")
+REINSTALL = "uv tool install --force FILE.whl"
+HOME = Path(__file__).resolve().parent.parent
+
+
+def foreign_packages() -> dict[str, str]:
+    """Package -> the folder of another project that Python takes it from."""
+    found = {}
+    for name in PACKAGES:
+        spec = find_spec(name)
+        places = list(spec.submodule_search_locations or []) if spec is not None else []
+        if places and Path(places[0]).resolve().parent != HOME:
+            found[name] = places[0]
+    return found
+
+
+def damaged_files() -> list[str]:
+    """Installed files that are missing or have another size than recorded; none in a checkout."""
+    try:
+        installed = metadata.distribution("palpebra")
+    except metadata.PackageNotFoundError:
+        return []
+    damaged = []
+    # Not `metadata.files`, which leaves out missing files.
+    for name, _, size in csv.reader((installed.read_text("RECORD") or "").splitlines()):
+        # Commands lie outside and every installer writes its own; compiled files and the record itself have no size.
+        if size and not name.startswith(".."):
+            path = Path(str(installed.locate_file(name)))
+            if not path.is_file() or path.stat().st_size != int(size):
+                damaged.append(name)
+    return damaged
+
+
+def refuse_broken_installation() -> None:
+    """Stop with one line if a file is missing or damaged, or another project's package hides one of ours.
+
+    Raises
+    ------
+    InputError
+        Names the file, or the package and its folder.
+    """
+    if damaged := damaged_files():
+        more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+        raise InputError(
+            f"the installation is damaged: {damaged[0]}{more} is missing or has another size; install "
+            f"Palpebra again: {REINSTALL}"
+        )
+    for name, place in foreign_packages().items():
+        raise InputError(
+            f"package '{name}': expected Palpebra's, got the one in {place}; install Palpebra in a separate "
+            f"environment: {install_line()}"
+        )
