@@ -33,7 +33,7 @@ def damaged_files() -> list[str]:
     damaged = []
     # Not `metadata.files`, which leaves out missing files.
     for name, _, size in csv.reader((installed.read_text("RECORD") or "").splitlines()):
-        # Commands lie outside and every installer writes its own; compiled files and the record itself have no size.
+        # Commands lie outside, and each installer writes its own. Compiled files and the record have no size.
         if size and not name.startswith(".."):
             path = Path(str(installed.locate_file(name)))
             if not path.is_file() or path.stat().st_size != int(size):
