@@ -64,10 +64,9 @@ def fingerprint(name: str, beside: Path | None = None) -> str:
 
 @lru_cache(maxsize=2)
 def _drawn(name: str) -> Character:
-    from stimuli_builder.characters.cartoon_pen import LOOKS
-    from stimuli_builder.clips.character_levels import CartoonCharacter
+    from stimuli_builder.clips.character_levels import DRAWN_LOOKS, CartoonCharacter
 
-    return CartoonCharacter(LOOKS[name])
+    return CartoonCharacter(DRAWN_LOOKS[name])
 
 
 @lru_cache(maxsize=16)
@@ -77,5 +76,5 @@ def _baked(folder: Path) -> Character:
     return BakedCharacter(folder)
 
 
-DRAWN = ("cartoon", "cartoon-willow")
+DRAWN = ("cartoon", "cartoon-willow", "cartoon@2")
 """Characters that are drawn by a program; every other is a folder of pictures."""

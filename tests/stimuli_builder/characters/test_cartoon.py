@@ -6,7 +6,8 @@ import pytest
 from experiments.errors import InputError
 from stimuli_builder.characters.cartoon import LEVELS, OPENING_MM, crop_px, draw_frame, fingerprint
 from stimuli_builder.characters.cartoon_eye import margins
-from stimuli_builder.characters.cartoon_pen import CARTOON, LOOKS, WILLOW, CartoonLook
+from stimuli_builder.characters.cartoon_pen import CARTOON, WILLOW, CartoonLook
+from stimuli_builder.clips.character_levels import CARTOON_2, DRAWN_LOOKS, CartoonCharacter
 from stimuli_builder.clips.characters import DRAWN
 
 SIZE = (1920, 720)
@@ -83,31 +84,35 @@ def test_closure_outside_its_range_is_refused(closure: float) -> None:
 
 def test_every_look_is_a_character() -> None:
     """The names stand apart from the looks, which need the drawing library."""
-    assert tuple(LOOKS) == DRAWN
+    assert tuple(DRAWN_LOOKS) == DRAWN
 
 
 def test_each_drawing_has_its_own_fingerprint() -> None:
-    assert [len(fingerprint(look)) for look in (CARTOON, WILLOW)] == [64, 64]
-    assert fingerprint(CARTOON) != fingerprint(WILLOW)
+    prints = [CartoonCharacter(look).fingerprint for look in (CARTOON, WILLOW, CARTOON_2)]
+    assert [len(one) for one in prints] == [64, 64, 64]
+    assert len(set(prints)) == 3
+    # A study's clips of the first one are known by it.
+    assert prints[0] == fingerprint(CARTOON)
 
 
-def white_mm(closure: float, side: int) -> float:
-    """Height of the white of one eye of `cartoon-willow` in the column 8 mm to the temple."""
+def white_mm(closure: float, side: int, look: CartoonLook) -> float:
+    """Height of the white of one eye in the column 8 mm to the temple."""
     x = 960 + round(side * 38 * PX_PER_MM)
-    column = draw_frame(closure, SIZE, (x, 260, 1, 260), WILLOW)[:, 0]
+    column = draw_frame(closure, SIZE, (x, 260, 1, 260), look)[:, 0]
     # Bluish next to skin, lashes and rims, all of which are brown.
     return float((column[:, 2] > 0.8 * column[:, 0]).sum() / PX_PER_MM)
 
 
+@pytest.mark.parametrize("look", [WILLOW, CARTOON_2], ids=lambda look: look.name)
 @pytest.mark.parametrize("closure", [0.15, 0.3, 0.5, 0.6])
-def test_eyes_of_which_one_leads_open_as_declared_in_the_mean(closure: float) -> None:
-    opened, now = (np.array([white_mm(c, side) for side in (-1, 1)]) for c in (0.0, closure))
+def test_eyes_of_which_one_leads_open_as_declared_in_the_mean(closure: float, look: CartoonLook) -> None:
+    opened, now = (np.array([white_mm(c, side, look) for side in (-1, 1)]) for c in (0.0, closure))
     shares = now / opened
     assert shares.mean() == pytest.approx(1 - closure, abs=0.025)
     assert shares[1] - shares[0] == pytest.approx(0.05 * np.sin(np.pi * closure), abs=0.025)
 
 
-@pytest.mark.parametrize("look", [CARTOON, WILLOW], ids=lambda look: look.name)
+@pytest.mark.parametrize("look", [CARTOON, WILLOW, CARTOON_2], ids=lambda look: look.name)
 def test_nothing_of_the_iris_glows_between_lids_that_nearly_touch(look: CartoonLook) -> None:
     """The first drawing keeps its line of iris: studies have its clips."""
     (left, _), closure = look.eyes, 0.93
