@@ -9,6 +9,8 @@ import subprocess
 import tarfile
 import tempfile
 import tomllib
+import zipfile
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cached_property
 from io import BytesIO
@@ -533,13 +535,42 @@ def _take(name: str, retired: Retired, source: Path, draft: Path) -> None:
         if (folder / DECLARATION_FILE).is_file():
             shutil.copytree(folder, draft)
             return
-    with tarfile.open(fileobj=BytesIO(_archive(name, retired, source))) as tar:
-        # Python before 3.11.4 has no filters; the archive is git's own.
-        if hasattr(tarfile, "data_filter"):
-            tar.extractall(draft.parent, filter="data")
+    release = source
+    if not source.is_file():
+        release = draft.parent / "history.tar"
+        release.write_bytes(_archive(name, retired, source))
+    files = _files_in_release(name, retired, release)
+    draft.mkdir()
+    for path, data in files.items():
+        (draft / path.rpartition("/")[2]).write_bytes(data)
+
+
+def _files_in_release(name: str, retired: Retired, release: Path) -> dict[str, bytes]:
+    """The character's files in a release file by their paths: a wheel or zip, or a source archive."""
+
+    def belongs(path: str) -> bool:
+        # Whatever folders are before it; a character's folder has no others in it.
+        parent, _, file = path.rpartition("/")
+        return bool(file) and f"/{parent}".endswith(f"/{retired.folder}")
+
+    try:
+        if zipfile.is_zipfile(release):
+            with zipfile.ZipFile(release) as wheel:
+                files = {path: wheel.read(path) for path in wheel.namelist() if belongs(path)}
         else:
-            tar.extractall(draft.parent)  # noqa: S202
-    (draft.parent / retired.folder).replace(draft)
+            with tarfile.open(release) as tar:
+                held = {one.name: tar.extractfile(one) for one in tar.getmembers() if belongs(one.name)}
+                files = {path: content.read() for path, content in held.items() if content is not None}
+    # Damaged archives end in any of these.
+    except (tarfile.TarError, zipfile.BadZipFile, EOFError, zlib.error) as error:
+        raise InputError(
+            f"{release}: expected a release file (.whl, .tar.gz or .zip) that can be read: {error}"
+        ) from error
+    if not files:
+        raise InputError(
+            f"{release} does not contain '{name}' ({retired.folder}): use the file of a release that had it"
+        )
+    return files
 
 
 def _archive(name: str, retired: Retired, source: Path) -> bytes:

@@ -56,8 +56,8 @@ def fetch_character(
         typer.Option(
             "--from",
             help=(
-                "Clone of Palpebra, an unpacked earlier release, or the character's folder [default: this "
-                "clone]."
+                "Clone of Palpebra, an earlier release (its .whl, .tar.gz or .zip, or unpacked), or the "
+                "character's folder [default: this clone]."
             ),
         ),
     ] = None,
@@ -74,6 +74,8 @@ def fetch_character(
       stimuli character fetch photorealistic
 
       stimuli character fetch photorealistic --from ~/Downloads/palpebra-2026-11 --out my/photorealistic
+
+      stimuli character fetch photorealistic --from palpebra-0.1.0-py3-none-any.whl --out my/photorealistic
     """
     target = out or SHIPPED_FOLDER / name
     typer.echo(f"'{name}' is in {restore(name, source, target)}")

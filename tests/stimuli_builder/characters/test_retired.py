@@ -83,6 +83,37 @@ def test_it_comes_out_of_an_earlier_release(repository: Path, tiny_character: Pa
     assert restore("old", tiny_character, tmp_path / "b" / "old").is_dir()
 
 
+@pytest.mark.parametrize("kind", ["zip", "gztar"])
+@pytest.mark.parametrize("top", ["", "palpebra-0.1.0"])
+def test_it_comes_out_of_a_release_file(
+    repository: Path, tiny_character: Path, tmp_path: Path, kind: str, top: str
+) -> None:
+    shutil.copytree(tiny_character, tmp_path / "release" / top / FOLDER)
+    file = Path(shutil.make_archive(str(tmp_path / "palpebra"), kind, tmp_path / "release"))
+    # A wheel is a zip file, whatever its name.
+    folder = restore("old", file.rename(tmp_path / "palpebra.whl"), tmp_path / "data" / "old")
+    assert {one.name: one.read_bytes() for one in folder.iterdir()} == {
+        one.name: one.read_bytes() for one in tiny_character.iterdir()
+    }
+
+
+def test_a_file_that_is_no_release_is_one_line(repository: Path, tmp_path: Path) -> None:
+    wrong, other = tmp_path / "notes.zip", tmp_path / "other"
+    wrong.write_text("no archive")
+    (other / "pictures").mkdir(parents=True)
+    empty = Path(shutil.make_archive(str(tmp_path / "empty"), "zip", other))
+    cut = Path(shutil.make_archive(str(tmp_path / "cut"), "gztar", repository))
+    cut.write_bytes(cut.read_bytes()[:-200])
+    for file, said in (
+        (wrong, "expected a release file"),
+        (empty, "does not contain 'old'"),
+        (cut, "expected a release file"),
+    ):
+        with pytest.raises(InputError, match=said):
+            restore("old", file, tmp_path / "data" / "old")
+    assert not (tmp_path / "data" / "old").exists()
+
+
 def test_other_pictures_than_it_had_are_refused_and_nothing_stays(
     repository: Path, tiny_character: Path, tmp_path: Path
 ) -> None:
