@@ -16,7 +16,12 @@ mixed <- function(name, d, id, y, within=c(), between=c(), covariate=c(), item=c
   if (slopes != "none") { # two-level factors: numeric +-1
     xs <- within; for (f in xs) d[[paste0(f,".n")]] <- ifelse(as.integer(d[[f]])==1, 1, -1)
     xn <- paste0(xs, ".n")
-    re[1] <- if (slopes=="correlated") sprintf("(1+%s|%s)", paste(xn, collapse="+"), id) else sprintf("(1+%s||%s)", paste(xn, collapse=if (slopes=="all") "*" else "+"), id)
+    # A covariate that varies within people has a slope wherever factors have one, correlated with the intercept.
+    moving <- Filter(function(x) any(tapply(d[[x]], d[[id]], var) > 0, na.rm=TRUE), covariate)
+    of_people <- paste(c("1", moving, if (slopes=="correlated") xn), collapse="+")
+    own <- paste(xn, collapse=if (slopes=="all") "*" else "+")
+    re[1] <- if (slopes=="correlated") sprintf("(%s|%s)", of_people, id) else if (length(moving))
+      sprintf("(%s|%s) + (0+%s||%s)", of_people, id, own, id) else sprintf("(1+%s||%s)", own, id)
   }
   m <- suppressMessages(suppressWarnings(lmerTest::lmer(as.formula(paste(y, "~", fixed, "+", paste(re, collapse="+"))), d,
     control=lmerControl(optimizer="bobyqa", optCtrl=list(rhoend=1e-10, maxfun=1e5), check.conv.grad="ignore"))))
