@@ -50,8 +50,7 @@ WEIBULL = (
 
 def compared_by(differences: "Sequence[Difference]") -> str:
     """How series were compared; nothing where none were."""
-    # Only Welch's df are not whole.
-    paired = [float(one.df).is_integer() for one in differences]
+    paired = [one.paired for one in differences]
     tests = ["within people by paired t tests"] * any(paired)
     tests += ["between groups by Welch's t tests"] * (not all(paired))
     return f"Series are compared {' and '.join(tests)}, Holm-corrected. " if tests else ""

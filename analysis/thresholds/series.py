@@ -35,7 +35,7 @@ class SeriesFit:
 class Difference:
     """An estimate of two series compared; p corrected by Holm over all pairs of series.
 
-    Within people by a paired t test; between groups of people by Welch's, whose df are not a whole number.
+    Within people by a paired t test; between groups of people by Welch's.
     """
 
     first: str
@@ -48,6 +48,7 @@ class Difference:
     df: float
     p: float
     p_holm: float
+    paired: bool
     what: str = "threshold"
 
 
@@ -56,14 +57,17 @@ def differences(
 ) -> tuple[Difference, ...]:
     """The estimates by person of every two series compared, in pairs where the same people have both."""
     made = [row for one, other in combinations(series, 2) if (row := _compared(one, other)) is not None]
-    corrected = holm(np.array([row[-1] for row in made])).tolist() if made else []
-    return tuple(Difference(*row, p, what) for row, p in zip(made, corrected, strict=True))
+    corrected = holm(np.array([row[-1] for _, row in made])).tolist() if made else []
+    return tuple(Difference(*row, p, paired, what) for (paired, row), p in zip(made, corrected, strict=True))
+
+
+_Row = tuple[str, str, int, float, float, float, float, float, float]
 
 
 def _compared(
     one: tuple[str, Mapping[str, float]], other: tuple[str, Mapping[str, float]]
-) -> tuple[str, str, int, float, float, float, float, float, float] | None:
-    """Labels, people, difference with its interval, t, df and p; None where too few people say too little."""
+) -> tuple[bool, _Row] | None:
+    """Whether in pairs; labels, people, difference with its interval, t, df and p. None of too few people."""
     (label, first), (other_label, second) = one, other
     both = sorted(first.keys() & second.keys())
     if both:
@@ -81,7 +85,7 @@ def _compared(
         people, difference = a.size + b.size, float(a.mean() - b.mean())
     low, high = test.confidence_interval(0.95)
     numbers = (difference, float(low), float(high), float(test.statistic), float(test.df))
-    return (label, other_label, people, *numbers, float(test.pvalue))
+    return bool(both), (label, other_label, people, *numbers, float(test.pvalue))
 
 
 # The answers of a threshold study, by series.

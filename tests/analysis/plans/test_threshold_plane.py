@@ -15,8 +15,10 @@ from analysis.plans.threshold import READING
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Contents
 from analysis.report.numbers import fixed
+from analysis.report.threshold_contents import compared_by
 from analysis.report.write import write_report
 from analysis.thresholds.plane import counted_points, fit_plane
+from analysis.thresholds.series import differences
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.kinds.threshold import THRESHOLDS
@@ -148,10 +150,20 @@ def test_series_of_two_groups_are_compared_by_welch(tmp_path: Path, experiment: 
         if set(map(len, each)) == {3} and {one["first"], one["second"]} in GROUPS[experiment is BETWEEN]:
             t, p = stats.ttest_ind(*each, equal_var=False)
             assert (one["t"], one["p"], one["people"]) == (pytest.approx(t), pytest.approx(p), 6)
-            assert not float(one["df"]).is_integer()
+            assert not one["paired"]
             break
     else:
         raise AssertionError(pair)
+
+
+def test_groups_whose_welch_df_are_whole_by_chance_are_not_called_paired() -> None:
+    """Equal sizes and variances: Welch's df are those of Student."""
+    first, second = {"a": 1.0, "b": 2.0, "c": 3.0}, {"d": 2.0, "e": 3.0, "f": 4.0}
+    between = differences([("s1", first), ("s2", second)])
+    assert between[0].df == 4
+    assert compared_by(between) == "Series are compared between groups by Welch's t tests, Holm-corrected. "
+    within = differences([("s1", first), ("s2", dict(zip("abc", (2.0, 3.5, 4.0), strict=True)))])
+    assert compared_by(within) == "Series are compared within people by paired t tests, Holm-corrected. "
 
 
 GROUPS = {True: ({"s1", "s2"},), False: ({"s1", "s2"}, {"s3", "s4"}, {"s1", "s4"})}
