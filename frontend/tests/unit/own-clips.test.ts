@@ -3,12 +3,16 @@ import { Refused, titleOf } from "../../src/admin/api";
 import type { Data } from "../../src/admin/builder/data";
 import {
   arrangementOf,
+  cellsByPattern,
   factorsOf,
   filledByPattern,
+  filledInOrder,
+  gridProblem,
   meetingOfClips,
   type Place,
   placesToSave,
   slotsOf,
+  tableOfCells,
   withMoved,
   withRenames,
 } from "../../src/admin/builder/places";
@@ -23,13 +27,69 @@ import {
   declaredPattern,
   factorsOfTable,
   levelsByPattern,
+  levelsOfPattern,
+  numbersProblem,
   patternProblem,
   reservedProblem,
+  saysNothing,
   unnamedFactors,
   withNames,
 } from "../../src/admin/studies/file-pattern";
 
 const FILES = ["rosie_slow_1.mp4", "hal_slow_1.webm", "hal_fast_2.mp4"];
+
+describe("the grid of a new study", () => {
+  const clips = ["IMG_2.mov", "IMG_10.mov", "IMG_1.mov", "IMG_3.mov"].map((file): Place => ({
+    clip_sha256: `sha of ${file}`,
+    file,
+    levels: {},
+    exemplar: 0,
+    upload: "u",
+  }));
+  const typed = (...factors: [string, string][]) => ({ factors: factors.map(([name, levels]) => ({ name, levels })), places: clips });
+
+  it("is filled in order of the file names, cells by rows", () => {
+    const cells = typed(["Robot type", "tin, rosie"], ["speed", " slow ,very fast,slow,"]);
+    expect(gridProblem(cells)).toBe("a cell for each clip");
+    const full = { ...cells, places: filledInOrder(cells) };
+    expect(gridProblem(full)).toBe(false);
+    expect(tableOfCells(full).split("\n")).toEqual([
+      '"file","Robot_type","speed","exemplar"',
+      '"IMG_1.mov","tin","slow","1"',
+      '"IMG_2.mov","tin","very fast","1"',
+      '"IMG_3.mov","rosie","slow","1"',
+      '"IMG_10.mov","rosie","very fast","1"',
+    ]);
+  });
+
+  it("has as many places in each cell as the clips fill, and names what is wrong", () => {
+    const two = typed(["speed", "slow, fast"]);
+    expect(slotsOf({ factors: [], exemplars: {} })).toEqual([]);
+    expect(
+      arrangementOf(filledInOrder(two), {
+        factors: [{ name: "speed", levels: [{ name: "slow" }, { name: "fast" }] }],
+        exemplars: { per_cell: 2 },
+      }).rest,
+    ).toEqual([]);
+    const odd = typed(["speed", "slow, normal, fast"]);
+    expect(gridProblem({ ...odd, places: filledInOrder(odd) })).toBe("a clip for each place of the grid, or other levels");
+    expect(gridProblem(typed(["", "slow"]))).toBe("what varies between the clips with its levels");
+    expect(gridProblem(typed(["a", "x, y"], ["a", "z, w"]))).toBe("another name for each factor");
+    expect(gridProblem({ ...typed(["response", "x, y"]), places: filledInOrder(typed(["response", "x, y"])) })).toContain(
+      "other than ‘response’",
+    );
+  });
+
+  it("begins with what a pattern reads", () => {
+    const places = FILES.map((file): Place => ({ clip_sha256: file, file, levels: {}, exemplar: 0, upload: "u" }));
+    const cells = cellsByPattern(places, "{robot}_{speed}_{exemplar}.mp4");
+    expect(cells.factors).toEqual([
+      { name: "robot", levels: "hal, rosie" },
+      { name: "speed", levels: "fast, slow" },
+    ]);
+    expect(cellsByPattern(places, "").factors).toEqual([{ name: "", levels: "" }]);
+  });
+});
 
 describe("levels by the names of files", () => {
   it("are shown of every file, those that do not fit first", () => {
@@ -47,6 +107,23 @@ describe("levels by the names of files", () => {
     expect(patternProblem("{exemplar}.mp4", FILES)).toContain("such as {speed}");
     expect(patternProblem("{robot}_{speed}_{exemplar}.mp4", [...FILES, "notes.mp4"])).toContain("notes.mp4 does not");
     expect(patternProblem("{robot}_{speed}_{exemplar}.mp4", FILES)).toBe(false);
+  });
+
+  it("say nothing where they only number the clips", () => {
+    expect(saysNothing("IMG_{factor1}.mp4", ["IMG_4031.mov", "IMG_4032.mkv"])).toBe(true);
+    expect(saysNothing("{exemplar}.mp4", ["1.mp4", "2.mp4"])).toBe(true);
+    expect(saysNothing("", ["a.mp4"])).toBe(true);
+    expect(saysNothing("{speed}.mp4", ["slow.mp4", "fast.mp4"])).toBe(false);
+    expect(saysNothing("{factor1}.mp4", ["calm.mp4", "wild.mp4"])).toBe(false);
+    expect(saysNothing("blink_{factor1}.mp4", ["blink_50.mp4", "blink_75.mp4", "blink_100.mp4"])).toBe(false);
+    expect(saysNothing("{factor1}_{factor2}.mp4", ["a_b.mp4", "c_d.mp4"])).toBe(false);
+  });
+
+  it("of a threshold have a factor of at least four numbers", () => {
+    const files = ["50", "75", "100", "1e2", "150"].map((speed) => `smile_${speed}_anna.mp4`);
+    expect(numbersProblem(levelsOfPattern("smile_{speed}_{who}.mp4", files))).toBe(false);
+    expect(numbersProblem(levelsOfPattern("smile_{speed}_{who}.mp4", files.slice(0, 4)))).toContain("at least 4 levels");
+    expect(numbersProblem([["slow", "fast", "1", "2", "3"]])).toContain("numbers");
   });
 
   it("of a study that is there are known by its own levels, also for one clip alone", () => {

@@ -28,6 +28,7 @@ def test_a_clip_chosen_by_mistake_is_left_out_and_what_was_typed_stays(
     title = panel.get_by_label("Title of the study")
     title.fill("Ohne Probe")
 
+    panel.get_by_text("Each file: its conversion, and leaving it out").click()
     panel.get_by_role("button", name="Leave out Probe.mp4").press("Enter")
     expect(panel.get_by_text("3 clips received")).to_be_visible()
     expect(panel.get_by_role("status", name="Left out")).to_contain_text("Probe.mp4 is left out.")
@@ -83,6 +84,7 @@ def test_all_clips_can_be_left_out_and_come_back(dashboard: Dashboard, tmp_path:
     panel = page.get_by_role("tabpanel", name="From your own clips")
     video = write_video(tmp_path / "a_1.mp4", "libx264", size_px=(320, 120))
     panel.locator('input[type="file"]').first.set_input_files(video)
+    panel.get_by_text("Each file: its conversion, and leaving it out").click(timeout=60_000)
     panel.get_by_role("button", name="Leave out a_1.mp4").click(timeout=60_000)
     expect(panel.get_by_text("0 clips received")).to_be_visible()
     expect(panel.get_by_text("Still needed: clips that have been looked into")).to_be_visible()

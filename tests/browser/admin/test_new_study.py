@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, ViewportSize, expect
 
 from tests.browser.admin.conftest import Dashboard
 from tests.browser.admin.test_own_videos import shoot
@@ -14,6 +14,8 @@ from tests.helpers.tiny_clips import encoded_video
 pytestmark = pytest.mark.browser
 MAX_INTERACTIONS = 20
 MAX_INTERACTIONS_OF_OTHERS = 25
+SCREEN: ViewportSize = {"width": 1440, "height": 900}
+MOST_PX = 2 * SCREEN["height"]
 
 
 class Hand:
@@ -153,6 +155,67 @@ def test_each_kind_of_study_is_live_within_its_interactions(
     assert "/run/" in page.get_by_role("dialog").locator("code").first.inner_text()
     most = MAX_INTERACTIONS if card.startswith("Rating") else MAX_INTERACTIONS_OF_OTHERS
     assert hand.interactions <= most, f"{hand.interactions} interactions"
+
+
+def test_names_that_say_nothing_lead_into_the_grid(dashboard: Dashboard, clips: list[Path]) -> None:
+    clips = [clip.rename(clip.with_name(f"IMG_{4031 + number}.mp4")) for number, clip in enumerate(clips)]
+    page = dashboard.open("/")
+    page.evaluate("localStorage.clear()")
+    hand = Hand(page)
+    hand.click(page.get_by_role("link", name="New study"))
+    hand.fill(page.get_by_label("Short name"), "unnamed")
+    hand.bring(clips)
+    page.get_by_text("12 clips received").wait_for()
+    expect(page.get_by_role("radio", name="Put clips into a grid")).to_be_checked()
+    expect(page.get_by_text("Still needed: what varies between the clips with its levels")).to_be_visible()
+    robot, speed = (page.get_by_role("group", name=f"Factor {number}") for number in (1, 2))
+    hand.fill(robot.get_by_role("textbox").first, "robot type")
+    hand.fill(robot.get_by_label("Its levels"), "tin, rosie")
+    hand.press("Add something else that varies")
+    hand.fill(speed.get_by_role("textbox").first, "speed")
+    hand.fill(speed.get_by_label("Its levels"), "slow, normal, very fast")
+    expect(page.get_by_text("12 places are empty")).to_be_visible()
+    hand.press("Fill the grid in order of the file names")
+    expect(page.locator(".grid-of-cells canvas[data-drawn]").first).to_be_visible()
+    # One is in a wrong cell: it changes places with another.
+    hand.click(page.get_by_role("button", name="tin/slow, no. 1: IMG_4031.mp4"))
+    hand.click(page.get_by_role("button", name="rosie/very fast, no. 2: IMG_4042.mp4"))
+    expect(page.get_by_role("button", name="tin/slow, no. 1: IMG_4042.mp4")).to_be_visible()
+    hand.fill(page.get_by_label("Title of the study"), "Robots without names")
+    assert axe_violations(page) == []
+    page.set_viewport_size(SCREEN)
+    assert page.evaluate("document.documentElement.scrollHeight") <= MOST_PX
+    page.get_by_role("radiogroup", name="Where the levels come from").scroll_into_view_if_needed()
+    shoot(dashboard, "new-grid")
+    hand.press("Create")
+    page.get_by_text("unnamed, version 1").wait_for()
+    hand.press("Set live")
+    hand.click(page.get_by_role("dialog").get_by_role("button", name="Set live"))
+    expect(page.get_by_text("Participants can start", exact=True)).to_be_visible()
+    assert hand.interactions <= MAX_INTERACTIONS, f"{hand.interactions} interactions"
+    stored = page.request.get(f"{dashboard.server.address}/api/admin/studies/unnamed/clips").json()
+    files = {f"{clip['cell']} {clip['exemplar']}": clip["file"] for clip in stored}
+    assert files["tin/slow 1"] == "IMG_4042.mp4"
+    assert files["tin/slow 2"] == "IMG_4032.mp4"
+    assert files["rosie/very fast 2"] == "IMG_4031.mp4"
+
+
+def test_a_threshold_names_the_numbers_it_lacks_before_it_is_made(
+    dashboard: Dashboard, clips: list[Path]
+) -> None:
+    page = dashboard.open("/studies/new")
+    page.evaluate("localStorage.clear()")
+    page.reload()
+    Hand(page).bring(clips)
+    page.get_by_text("12 clips received").wait_for()
+    page.get_by_role("radio", name="Just-noticeable difference").click()
+    page.get_by_label("Title of the study").fill("Numbers")
+    lacks = page.get_by_text("a factor with at least 4 levels that are all numbers")
+    expect(lacks).to_be_visible()
+    expect(page.get_by_role("button", name="Create", exact=True)).to_be_disabled()
+    page.get_by_role("radio", name="Rating on seven points").click()
+    expect(lacks).to_have_count(0)
+    page.get_by_role("button", name="Start over").click()
 
 
 def test_a_demonstration_is_built_by_a_button_and_made_a_study(dashboard: Dashboard) -> None:

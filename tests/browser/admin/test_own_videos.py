@@ -60,6 +60,7 @@ def test_videos_of_any_format_become_a_study(
     panel.get_by_role("button", name="Start over").click()
     files.set_input_files(videos)
     expect(panel.get_by_text("4 clips received: 1 unchanged, 3 converted")).to_be_visible(timeout=60_000)
+    panel.get_by_text("Each file: its conversion, and leaving it out").click()
     expect(table.get_by_text("encoded as H.264, was vp9")).to_be_visible()
     page.reload()  # what was sent is still there
     page.get_by_label("Short name").fill("mixed")

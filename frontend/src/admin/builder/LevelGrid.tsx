@@ -9,7 +9,21 @@ import { declaredPattern, fieldsOf, levelsByPattern } from "../studies/file-patt
 import { useDropTarget } from "../ui/DropZone";
 import { counted } from "../ui/format";
 import { type Data, listAt, textAt } from "./data";
-import { arrangementOf, factorsOf, filledByPattern, isClip, type Place, reconciled, type Slot, withMoved } from "./places";
+import {
+  arrangementOf,
+  designOfTyped,
+  factorsOf,
+  filledByPattern,
+  filledInOrder,
+  isClip,
+  type NewCells,
+  type Place,
+  reconciled,
+  type Slot,
+  type TypedFactor,
+  uploadedPlaces,
+  withMoved,
+} from "./places";
 import { useBuilderHere } from "./useBuilder";
 
 // The first frame of a clip, drawn once: one video at a time, so that hundreds of clips need one decoder.
@@ -255,18 +269,21 @@ function ByNames({ clips, fill }: { clips: readonly Place[]; fill: (pattern: str
   );
 }
 
-export function LevelGrid({ study }: { study: string }) {
-  const builder = useBuilderHere();
-  const { data, arrange } = builder;
-  const sent = useUpload(`study ${study}`);
-  const uploaded = sent.received;
-  const places = useMemo(() => withUploaded(builder.places ?? [], uploaded), [builder.places, uploaded]);
+interface ClipsProps {
+  data: Data;
+  places: readonly Place[];
+  arrange: (places: readonly Place[]) => void;
+  /** What becomes of clips that are in no cell. */
+  otherwise: string;
+}
+
+/** The grid with its clips, those in no cell, and the clip in hand. */
+function ClipsInCells({ data, places, arrange, otherwise }: ClipsProps) {
   const { filled, rest } = useMemo(() => arrangementOf(places, data), [places, data]);
   const [chosen, setChosen] = useState<Place | null>(null);
   // After an undo or another edit the same clip is another object.
   const held = chosen === null ? null : (places.find((member) => isClip(member, chosen)) ?? null);
   const empty = filled.filter(({ clip }) => clip === null).map(({ slot }) => slot.name);
-  const unplayed = playNeeded(sent);
   const hand: Hand = {
     held,
     hold: setChosen,
@@ -275,12 +292,8 @@ export function LevelGrid({ study }: { study: string }) {
       setChosen(null);
     },
   };
-  const fill = (pattern: string) => {
-    const next = filledByPattern(places, data, pattern);
-    arrange(next.places, next.data);
-  };
   return (
-    <Stack gap="xs">
+    <>
       <Text size="sm">
         Drag a clip into a cell. Or choose a clip (click, Enter or Space), then choose its place in the same way. Escape puts it back.
       </Text>
@@ -294,7 +307,9 @@ export function LevelGrid({ study }: { study: string }) {
       )}
       {rest.length > 0 && (
         <div role="group" aria-label="Clips in no cell">
-          <Text size="sm">{counted(rest.length, "clip is", "clips are")} in no cell and will not be part of the next version:</Text>
+          <Text size="sm">
+            {counted(rest.length, "clip is", "clips are")} in no cell{otherwise}
+          </Text>
           <div className="spots">
             {rest.map((clip) => (
               <Spot key={`${clip.clip_sha256}${clip.file}`} slot={null} clip={clip} {...hand} />
@@ -302,6 +317,24 @@ export function LevelGrid({ study }: { study: string }) {
           </div>
         </div>
       )}
+    </>
+  );
+}
+
+export function LevelGrid({ study }: { study: string }) {
+  const builder = useBuilderHere();
+  const { data, arrange } = builder;
+  const sent = useUpload(`study ${study}`);
+  const uploaded = sent.received;
+  const places = useMemo(() => withUploaded(builder.places ?? [], uploaded), [builder.places, uploaded]);
+  const unplayed = playNeeded(sent);
+  const fill = (pattern: string) => {
+    const next = filledByPattern(places, data, pattern);
+    arrange(next.places, next.data);
+  };
+  return (
+    <Stack gap="xs">
+      <ClipsInCells data={data} places={places} arrange={arrange} otherwise=" and will not be part of the next version:" />
       <ByNames clips={places} fill={fill} />
       <details>
         <summary className="small-summary">Add clips</summary>
@@ -314,12 +347,64 @@ export function LevelGrid({ study }: { study: string }) {
   );
 }
 
+interface NewGridProps {
+  cells: NewCells;
+  onChange: (cells: NewCells) => void;
+}
+
+/** The grid of a study that is being made: what varies is typed, and its clips are put into the cells. */
+export function NewGrid({ cells, onChange }: NewGridProps) {
+  const { factors, places } = cells;
+  const data = useMemo(() => designOfTyped(cells), [cells]);
+  const change = (index: number, part: Partial<TypedFactor>) =>
+    onChange({ ...cells, factors: factors.map((factor, number) => (number === index ? { ...factor, ...part } : factor)) });
+  const isDrawn = listAt(data, ["factors"]).length > 0;
+  return (
+    <Stack gap="xs">
+      {factors.map(({ name, levels }, index) => (
+        <Group key={index} align="end" role="group" aria-label={`Factor ${index + 1}`}>
+          <TextInput
+            label={index === 0 ? "What varies" : "What else varies"}
+            placeholder="speed"
+            value={name}
+            onChange={(event) => change(index, { name: event.currentTarget.value })}
+            w={220}
+          />
+          <TextInput
+            label="Its levels, separated by commas"
+            placeholder="slow, normal, fast"
+            value={levels}
+            onChange={(event) => change(index, { levels: event.currentTarget.value })}
+            w={380}
+          />
+          {factors.length > 1 && (
+            <Button
+              variant="default"
+              aria-label={`Remove factor ${index + 1}`}
+              onClick={() => onChange({ ...cells, factors: factors.filter((_, number) => number !== index) })}
+            >
+              Remove
+            </Button>
+          )}
+        </Group>
+      ))}
+      <Group gap="xs">
+        <Button size="xs" variant="default" onClick={() => onChange({ ...cells, factors: [...factors, { name: "", levels: "" }] })}>
+          Add something else that varies
+        </Button>
+        <Button size="xs" variant="default" disabled={!isDrawn} onClick={() => onChange({ ...cells, places: filledInOrder(cells) })}>
+          Fill the grid in order of the file names
+        </Button>
+      </Group>
+      {isDrawn && <ClipsInCells data={data} places={places} arrange={(next) => onChange({ ...cells, places: next })} otherwise=":" />}
+    </Stack>
+  );
+}
+
 const MAX_NAMED = 8;
 
 /** The study's clips and those of an upload that can be used, in no cell until somebody puts them into one. */
 function withUploaded(places: readonly Place[], upload: ReturnType<typeof useUpload>["received"]): Place[] {
-  const ready = (upload?.files ?? []).flatMap(({ name, sha256, state }): Place[] =>
-    state !== "ready" || sha256 == null ? [] : [{ clip_sha256: sha256, file: name, levels: {}, exemplar: 0, upload: upload?.id ?? null }],
-  );
+  const ready = upload === null ? [] : uploadedPlaces(upload);
   return reconciled(places, [...places.filter((member) => member.upload === null), ...ready]);
 }

@@ -1,7 +1,7 @@
 /** Which clip is in which cell of a study of own clips: moved, swapped, filled from file names, kept when levels are renamed. */
 
 import type { Schemas } from "../api";
-import { fieldsOf, levelsByPattern } from "../studies/file-pattern";
+import { factorName, fieldsOf, levelsByPattern, reservedProblem } from "../studies/file-pattern";
 import { type Data, isTable, listAt, tableAt, textAt, withValue } from "./data";
 
 /** A clip with its cell; the exemplar is 0 while it is in none. */
@@ -42,6 +42,13 @@ export function storedPlaces(clips: readonly Schemas["ClipOut"][]): Place[] {
     upload: null,
     from: { levels, exemplar },
   }));
+}
+
+/** The clips of an upload that can be used, each in no cell. */
+export function uploadedPlaces({ id, files }: Pick<Schemas["UploadOut"], "id" | "files">): Place[] {
+  return files.flatMap(({ name, sha256, state }): Place[] =>
+    state !== "ready" || sha256 == null ? [] : [{ clip_sha256: sha256, file: name, levels: {}, exemplar: 0, upload: id }],
+  );
 }
 
 export function factorsOf(data: Data): Factor[] {
@@ -310,4 +317,80 @@ export function filledByPattern(places: readonly Place[], data: Data, pattern: s
   const perCell = fitting.reduce((most, { exemplar }) => Math.max(most, exemplar), 1);
   const withFactors = withValue(data, ["factors"], factors);
   return { data: withValue(withFactors, ["exemplars", "per_cell"], perCell) as Data, places: next };
+}
+
+// The grid of a new study: its factors as they are typed, its clips, and the table that the server reads.
+
+/** A factor as it is typed: its name, and its levels separated by commas. */
+export interface TypedFactor {
+  name: string;
+  levels: string;
+}
+
+export interface NewCells {
+  factors: readonly TypedFactor[];
+  places: readonly Place[];
+}
+
+const levelsOfText = (text: string) => [
+  ...new Set(
+    text
+      .split(/[,;\n]/)
+      .map((level) => level.trim())
+      .filter((level) => level !== ""),
+  ),
+];
+
+/** The design of typed factors; each cell has as many places as the clips fill. */
+export function designOfTyped({ factors, places }: NewCells): Data {
+  const known = factors
+    .map(({ name, levels }) => ({ name: factorName(name), levels: levelsOfText(levels) }))
+    .filter(({ name, levels }) => name !== "" && levels.length > 0);
+  const cells = known.reduce((product, { levels }) => product * levels.length, 1);
+  return {
+    factors: known.map(({ name, levels }) => ({ name, levels: levels.map((level) => ({ name: level, label: level })) })),
+    exemplars: { per_cell: Math.max(1, Math.ceil(places.length / cells)) },
+  };
+}
+
+/** What a grid begins with: the factors that a pattern reads from the names of files, or one that is still to be named. */
+export function cellsByPattern(places: readonly Place[], pattern: string): NewCells {
+  const read = filledByPattern(places, {}, pattern);
+  const factors = factorsOf(read.data).map(({ name, levels }) => ({ name, levels: levels.join(", ") }));
+  return { factors: factors.length > 0 ? factors : [{ name: "", levels: "" }], places: read.places };
+}
+
+/** Every clip in a place, both in their order: files by name, cells by rows. */
+export function filledInOrder(cells: NewCells): Place[] {
+  const slots = slotsOf(designOfTyped(cells));
+  const sorted = [...cells.places].sort((a, b) => a.file.localeCompare(b.file, "en", { numeric: true }));
+  return sorted.map((member, index) => ({ ...member, levels: slots[index]?.levels ?? {}, exemplar: slots[index]?.exemplar ?? 0 }));
+}
+
+/** What a grid lacks before a study can be made of it; false where nothing. */
+export function gridProblem(cells: NewCells): string | false {
+  const data = designOfTyped(cells);
+  const names = factorsOf(data).map(({ name }) => name);
+  if (names.length === 0) return "what varies between the clips with its levels";
+  if (new Set(names).size < names.length) return "another name for each factor";
+  const { filled, rest } = arrangementOf(cells.places, data);
+  const empty = filled.filter(({ clip }) => clip === null).length;
+  if (rest.length > 0 && empty > 0) return "a cell for each clip";
+  if (empty > 0) return "a clip for each place of the grid, or other levels";
+  return reservedProblem(names);
+}
+
+/** The levels of each factor that has a name. */
+export const levelsOfCells = (cells: NewCells) => factorsOf(designOfTyped(cells)).map(({ levels }) => levels);
+
+const quoted = (text: string) => `"${text.replaceAll('"', '""')}"`;
+
+/** The table of levels: one row for each clip in a cell. */
+export function tableOfCells(cells: NewCells): string {
+  const data = designOfTyped(cells);
+  const names = factorsOf(data).map(({ name }) => name);
+  const rows = arrangementOf(cells.places, data).filled.flatMap(({ slot, clip }) =>
+    clip === null ? [] : [[clip.file, ...names.map((name) => slot.levels[name] ?? ""), String(slot.exemplar)]],
+  );
+  return [["file", ...names, "exemplar"], ...rows].map((row) => row.map(quoted).join(",")).join("\n");
 }

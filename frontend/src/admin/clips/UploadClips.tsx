@@ -2,7 +2,7 @@
 
 import type { Schemas } from "../api";
 import { Alert, Button, FileInput, Group, Progress, Select, Stack, Text } from "@mantine/core";
-import type { ReactNode } from "react";
+import { type ReactNode, useState } from "react";
 import { onDemand } from "../ui/Answer";
 import { DropZone } from "../ui/DropZone";
 import { counted } from "../ui/format";
@@ -59,18 +59,21 @@ export function UploadClips({ upload, label = "Clips", description, accept = `.z
           onChange={(files) => files.length > 0 && upload.send(files)}
         />
       </DropZone>
-      <Select
-        label="Frame rate"
-        description="A video with a variable rate gets its most common rate. Frames are repeated or dropped, never blended."
-        data={[
-          { value: "own", label: "Keep each clip's rate" },
-          ...RATES.map((rate) => ({ value: rate, label: `${rate} frames per second` })),
-        ]}
-        value={upload.fps === null ? "own" : String(upload.fps)}
-        allowDeselect={false}
-        onChange={(value) => upload.askFps(value === null || value === "own" ? null : Number(value))}
-        maw={500}
-      />
+      <details>
+        <summary className="small-summary">More: frame rate</summary>
+        <Select
+          label="Frame rate"
+          description="A video with a variable rate gets its most common rate. Frames are repeated or dropped, never blended."
+          data={[
+            { value: "own", label: "Keep each clip's rate" },
+            ...RATES.map((rate) => ({ value: rate, label: `${rate} frames per second` })),
+          ]}
+          value={upload.fps === null ? "own" : String(upload.fps)}
+          allowDeselect={false}
+          onChange={(value) => upload.askFps(value === null || value === "own" ? null : Number(value))}
+          maw={500}
+        />
+      </details>
       <UploadProgress upload={upload} />
       {upload.received !== null && <Received upload={upload} received={upload.received} />}
     </Stack>
@@ -133,6 +136,7 @@ function Bar({ words, share, name }: { words: string; share: number; name: strin
 
 function Received({ upload, received }: { upload: Upload; received: Schemas["UploadOut"] }) {
   const { files } = received;
+  const [isListed, setListed] = useState(false);
   const refused = files.filter(({ state }) => state === "refused").length;
   const changed = files.filter(({ source }) => source != null).length;
   const size = sizeRemark(files);
@@ -191,7 +195,12 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
           {remark}
         </Alert>
       ))}
-      {!received.has_manifest && <FileTable files={inOrder(files)} leftOut={received.left_out} upload={upload} />}
+      {!received.has_manifest && (
+        <details open={isListed || refused > 0 || received.left_out.length > 0} onToggle={(event) => setListed(event.currentTarget.open)}>
+          <summary className="small-summary">Each file: its conversion, and leaving it out</summary>
+          <FileTable files={inOrder(files)} leftOut={received.left_out} upload={upload} />
+        </details>
+      )}
     </Stack>
   );
 }

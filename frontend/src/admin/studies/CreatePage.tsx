@@ -6,30 +6,12 @@ import { api, type Schemas, unwrap, Refused, studiesQuery, useOwnWorkspaces } fr
 import { Design, TomlText } from "./Design";
 import { useNavigate, Link } from "@tanstack/react-router";
 import { useChange } from "../ui/useChange";
-import {
-  Button,
-  Select,
-  Stack,
-  TextInput,
-  Alert,
-  SegmentedControl,
-  Table,
-  Text,
-  Textarea,
-  Anchor,
-  Card,
-  Progress,
-  Group,
-  SimpleGrid,
-  Title,
-  Tabs,
-} from "@mantine/core";
-import { useState, useRef } from "react";
+import { Button, Select, Stack, TextInput, Alert, Text, Anchor, Card, Progress, Group, SimpleGrid, Title, Tabs } from "@mantine/core";
+import { type ComponentProps, useState, useRef } from "react";
 import { UploadClips, StillNeeded } from "../clips/UploadClips";
 import { playNeeded, useUpload } from "../clips/useUpload";
-import { factorsOfTable, fieldsOf, levelsByPattern, patternProblem, reservedProblem, unnamedFactors, withNames } from "./file-pattern";
-import { Answer } from "../ui/Answer";
-import { TemplateCards, TEMPLATES, type TemplateWords } from "./templates";
+import { Answer, onDemand } from "../ui/Answer";
+import { TemplateCards, TEMPLATES } from "./templates";
 
 // TOML with its problems, checked while typing, and what it expands to.
 
@@ -155,7 +137,7 @@ function FromDefinition({ name, onTaken }: { name: string; onTaken: (message: st
 
 // A study from somebody's own clips: upload, say which levels each has, ask a question.
 
-const MAX_ROWS = 100;
+const Levels = onDemand(async () => (await import("./Levels")).Levels);
 
 function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: string) => void }) {
   const upload = useUpload("new study");
@@ -166,7 +148,7 @@ function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: stri
       <UploadClips upload={upload} />
       <TemplateCards chosen={template} onChoose={setTemplate} />
       {last !== null && (
-        <Levels
+        <StudyOfUpload
           key={last.id}
           name={name}
           template={template}
@@ -181,154 +163,14 @@ function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: stri
   );
 }
 
-const inWords = (levels: string[]) => `${levels.slice(0, 4).join(", ")}${levels.length > 4 ? " …" : ""}`;
-
-interface LevelsProps {
-  name: string;
-  template: TemplateWords;
-  upload: Schemas["UploadOut"];
-  /** Whether every file has been looked into. */
-  isLooked: boolean;
-  /** What is needed for every clip to play. */
-  notPlayed: string | false;
+interface OfUpload extends Omit<ComponentProps<typeof Levels>, "refused" | "isCreating" | "onCreate"> {
   onTaken: (message: string) => void;
   onCreated: () => void;
 }
 
-function Levels({ name, template, upload, isLooked, notPlayed, onTaken, onCreated }: LevelsProps) {
-  const [by, setBy] = useState("pattern");
-  // As the files suggest it, also after one was left out or came, until it is written.
-  const [written, setWritten] = useState<{ pattern?: string; csv?: string }>({});
-  const pattern = written.pattern ?? upload.suggested_pattern ?? "";
-  const csv = written.csv ?? `file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`;
-  // Until a question is written, it is the template's.
-  const [typed, setAsked] = useState({ title: "", question: null as string | null, low: "very unnatural", high: "very natural" });
-  const asked = { ...typed, question: typed.question ?? template.question };
-  const [names, setNames] = useState<Record<string, string>>({});
-  const files = upload.files.map((file) => file.name);
+function StudyOfUpload({ onTaken, onCreated, ...rest }: OfUpload) {
   const create = useCreate(onTaken, onCreated, true);
-  const refused = refusal(create.error);
-  const needed = [
-    (!isLooked || files.length === 0) && "clips that have been looked into",
-    notPlayed,
-    by === "pattern" ? patternProblem(withNames(pattern, names), files) : reservedProblem(factorsOfTable(csv)),
-    name === "" && "a short name (above)",
-    asked.title.trim() === "" && "a title of the study",
-  ];
-  const field = (key: keyof typeof asked, label: string) => (
-    <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...typed, [key]: event.currentTarget.value })} />
-  );
-  return (
-    <Stack>
-      <SegmentedControl
-        aria-label="Where the levels come from"
-        value={by}
-        onChange={setBy}
-        data={[
-          { value: "pattern", label: "By file names" },
-          { value: "csv", label: "By a table" },
-        ]}
-      />
-      {by === "pattern" ? (
-        <>
-          <TextInput
-            label="Pattern"
-            description="Names of factors in braces; {exemplar} numbers the clips of a cell."
-            placeholder="{character}_{speed}_{exemplar}.mp4"
-            value={pattern}
-            onChange={(event) => setWritten({ ...written, pattern: event.currentTarget.value })}
-          />
-          {unnamedFactors(pattern, files).map(({ field, levels }) => (
-            <TextInput
-              key={field}
-              label={`What are ${inWords(levels)}?`}
-              description={`The name of this factor in tables and figures, such as ‘speed’ for slow and fast. Default: ${field}.`}
-              value={names[field] ?? ""}
-              onChange={(event) => setNames({ ...names, [field]: event.currentTarget.value })}
-              maw={400}
-            />
-          ))}
-          <LevelsTable pattern={withNames(pattern, names)} files={files} />
-        </>
-      ) : (
-        <Textarea
-          className="editor"
-          label="Table (CSV)"
-          description="The column file, then one column per factor. The column exemplar is optional."
-          autosize
-          minRows={6}
-          maxRows={16}
-          value={csv}
-          onChange={(event) => setWritten({ ...written, csv: event.currentTarget.value })}
-        />
-      )}
-      {field("title", "Title of the study")}
-      {field("question", "Question")}
-      {template.ends && field("low", "Lowest answer means")}
-      {template.ends && field("high", "Highest answer means")}
-      <StillNeeded parts={needed} />
-      {refused !== null && (
-        <Alert color="red" variant="light" title="The study was not created" role="alert">
-          {refused}
-        </Alert>
-      )}
-      <Button
-        style={{ alignSelf: "flex-start" }}
-        disabled={needed.some(Boolean)}
-        loading={create.isPending}
-        onClick={() =>
-          create.mutate({
-            name,
-            upload: upload.id,
-            levels: by === "pattern" ? { pattern: withNames(pattern, names) } : { csv },
-            own_clips: { ...asked, template: template.value },
-          })
-        }
-      >
-        Create
-      </Button>
-    </Stack>
-  );
-}
-
-/** What the pattern reads from the names: all of a usual study, of thousands the first, those that do not fit before them. */
-function LevelsTable({ pattern, files }: { pattern: string; files: string[] }) {
-  const fields = fieldsOf(pattern);
-  if (fields.length === 0) return null;
-  const rows = levelsByPattern(pattern, files);
-  const strays = rows.filter(({ levels }) => levels === null).length;
-  return (
-    <div>
-      <Text size="sm" mb={4} role="status">
-        {strays === 0
-          ? `All ${files.length} file names fit the pattern.`
-          : `${strays} of ${files.length} file names do not fit the pattern.`}
-        {rows.length > MAX_ROWS && ` The first ${MAX_ROWS} are shown.`}
-      </Text>
-      <div className="long-list levels" tabIndex={0} role="region" aria-label="Levels of the files">
-        <Table aria-label="What the pattern reads">
-          <Table.Thead>
-            <Table.Tr>
-              <Table.Th>file</Table.Th>
-              {fields.map((field) => (
-                <Table.Th key={field}>{field}</Table.Th>
-              ))}
-            </Table.Tr>
-          </Table.Thead>
-          <Table.Tbody>
-            {rows.slice(0, MAX_ROWS).map(({ file, levels }) => (
-              <Table.Tr key={file}>
-                <Table.Td className="wrap-anywhere">{file}</Table.Td>
-                {fields.map((field, index) => (
-                  <Table.Td key={field}>{levels?.[index] ?? "does not fit"}</Table.Td>
-                ))}
-              </Table.Tr>
-            ))}
-          </Table.Tbody>
-        </Table>
-      </div>
-    </div>
-  );
+  return <Levels {...rest} refused={refusal(create.error)} isCreating={create.isPending} onCreate={(study) => create.mutate(study)} />;
 }
 
 const buildsQuery = { queryKey: ["clip builds"], queryFn: () => unwrap(api.GET("/api/admin/experiments/builds")) };

@@ -74,6 +74,36 @@ export interface Unnamed {
   levels: string[];
 }
 
+const MIN_NUMBERS = 4;
+
+/** What a threshold along a factor lacks, of the levels of each factor; false where one has enough numbers. */
+export function numbersProblem(levels: readonly (readonly string[])[]): string | false {
+  const isNumber = (level: string) => level.trim() !== "" && Number.isFinite(Number(level));
+  const fits = levels.some((of) => of.every(isNumber) && new Set(of.map(Number)).size >= MIN_NUMBERS);
+  return !fits && `a factor with at least ${MIN_NUMBERS} levels that are all numbers, such as 50, 75, 100, 150`;
+}
+
+/** The levels that a pattern reads for each factor. */
+export function levelsOfPattern(pattern: string, files: readonly string[]): string[][] {
+  const read = levelsByPattern(pattern, files);
+  return fieldsOf(pattern)
+    .map((field, position) => (field === EXEMPLAR ? [] : [...new Set(read.flatMap(({ levels }) => levels?.[position] ?? []))]))
+    .filter((levels) => levels.length > 0);
+}
+
+/** Counters have gaps where clips were deleted, but no more than this per clip. */
+const MAX_STEP = 4;
+
+/** Whether names only number the clips, such as IMG_4031 and IMG_4032: no factor is in them. */
+export function saysNothing(pattern: string, files: readonly string[]): boolean {
+  const named = fieldsOf(pattern).filter((field) => field !== EXEMPLAR);
+  const [unnamed] = unnamedFactors(pattern, files);
+  if (named.length !== 1 || unnamed === undefined) return named.length === 0;
+  const numbers = unnamed.levels.map((level) => (/^\d+$/.test(level) ? Number(level) : Number.NaN));
+  const isCounter = Math.max(...numbers) - Math.min(...numbers) <= MAX_STEP * numbers.length;
+  return files.length > 1 && numbers.length === files.length && isCounter;
+}
+
 /** The factors whose names say nothing, each with its levels: somebody has to say what they are. */
 export function unnamedFactors(pattern: string, files: readonly string[]): Unnamed[] {
   const read = levelsByPattern(pattern, files);
@@ -86,7 +116,7 @@ export function unnamedFactors(pattern: string, files: readonly string[]): Unnam
 export function withNames(pattern: string, names: Readonly<Record<string, string>>): string {
   const given = new Map<string, string>();
   for (const field of fieldsOf(pattern)) {
-    const name = nameFrom(names[field] ?? "");
+    const name = factorName(names[field] ?? "");
     const taken = [...fieldsOf(pattern), ...given.values(), EXEMPLAR];
     if (name !== "" && !taken.includes(name)) given.set(field, name);
   }
@@ -94,7 +124,7 @@ export function withNames(pattern: string, names: Readonly<Record<string, string
 }
 
 /** "Robot type" is called `Robot_type`; letters beyond ASCII lose their marks. */
-function nameFrom(words: string): string {
+export function factorName(words: string): string {
   const plain = words
     .replaceAll("ß", "ss")
     .normalize("NFD")

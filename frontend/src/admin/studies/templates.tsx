@@ -13,6 +13,8 @@ export interface TemplateWords {
   question: string;
   /** Whether the two ends of a scale are asked for. */
   ends: boolean;
+  /** Whether clips vary along a factor whose levels are numbers. */
+  isAlongNumbers?: boolean;
 }
 
 export const TEMPLATES: readonly [TemplateWords, ...TemplateWords[]] = [
@@ -54,16 +56,18 @@ export const TEMPLATES: readonly [TemplateWords, ...TemplateWords[]] = [
   {
     value: "pairs",
     label: "Paired comparisons",
-    about: "Two clips side by side. Every clip is compared with every other of the same exemplar number.",
+    about: "Two clips side by side. Each clip is compared with every other; to restrict that, see Build, Trial.",
     question: "Which clip looked more natural?",
     ends: false,
   },
   {
     value: "just_noticeable",
     label: "Just-noticeable difference",
-    about: "Two clips in turn, the standard and a stimulus, in adaptive series. One factor has numeric levels; the lowest is the standard.",
+    about:
+      "Two clips in turn, the standard and a stimulus, in adaptive series. One factor has numbers as levels; the lowest is the standard.",
     question: "In which of the two clips was the effect stronger?",
     ends: false,
+    isAlongNumbers: true,
   },
 ];
 
