@@ -11,13 +11,12 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from experiments.level_leaks import reported_leaks
 from experiments.load import parse_experiment
-from experiments.manifest import MANIFEST_NAME, Manifest
+from experiments.manifest import MANIFEST_NAME
 from server.context import Services
 from server.core.settings import Settings
 from server.core.storage import FolderStore
-from server.models import Job, Study, StudyVersion
+from server.models import Study, StudyVersion
 from server.operations.doctor import Finding
 from server.rehearsals.service import of_finding
 from server.studies import creation
@@ -25,35 +24,9 @@ from server.studies.creation import store_clips
 from server.transcoding.preparing import StoredClips
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
-from tests.helpers.motion_checks import checked
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
 from tests.helpers.tiny_clips import make_clip_folder
 from tests.helpers.uploads import upload
-
-
-def test_levels_distinguished_by_something_else_are_named_before_going_live(
-    owner: Admin, services: Services, tmp_path: Path
-) -> None:
-    add_study(services, tmp_path / "clips", status="draft")
-    assert _told_apart(owner) == []
-    with services.database.write() as session:
-        version = session.query(StudyVersion).one()
-        clips = [
-            clip | {"closure": [0.0, 1.0, 0.0 if clip["levels"]["speed"] == "slow" else 0.1]}
-            for clip in version.manifest["clips"]
-        ]
-        version.manifest = version.manifest | {"clips": clips}
-        expected = reported_leaks(Manifest.model_validate(version.manifest).clips)
-    answer = _told_apart(owner)
-    assert expected
-    assert [check["text"].lower() for check in answer] == [f"{text}.".lower() for text in expected]
-    assert all("'speed'" in check["text"] and not check["blocks"] for check in answer)
-
-
-def _told_apart(admin: Admin) -> list[Any]:
-    found = admin.get("/studies/short/launch-checks").json()
-    return [check for check in found if check["kind"] == "levels_told_apart"]
-
 
 CONSENT = '"Do you agree?"'
 PLACEHOLDERS = '"# [Title]\\n\\nA study on [topic]. Responsible: [name]."'
@@ -142,15 +115,6 @@ def test_a_recruiter_that_is_not_set_is_named_and_its_links_begin_no_visit(
     assert "recruiter" not in kinds
 
 
-def test_texts_without_a_translation_are_named_and_do_not_block(owner: Admin, study: StudyInDatabase) -> None:
-    [check] = [
-        check for check in owner.get("/studies/short/launch-checks").json() if check["kind"] == "translations"
-    ]
-    assert "de" in check["text"]
-    assert "forms.1.title" in check["text"]
-    assert not check["blocks"]
-
-
 def advice(admin: Admin, kind: str) -> list[str]:
     found = admin.get("/studies/short/launch-checks").json()
     return [check["text"] for check in found if check["kind"] == kind]
@@ -167,14 +131,6 @@ def test_recruiting_for_a_study_without_enough_checks_recommends_them(
     assert advice(owner, "person_checks") == []
     assert recruiting(owner, {"kind": "prolific", "code_complete": "C1"}).status_code == 200
     assert bool(advice(owner, "person_checks")) == advised
-
-
-def test_motion_checks_that_the_consent_does_not_mention_are_warned_of(
-    owner: Admin, services: Services, tmp_path: Path
-) -> None:
-    add_study(services, tmp_path / "clips", checked(SHORT), status="draft")
-    (warning,) = advice(owner, "flicker")
-    assert "(en, de)" in warning
 
 
 def test_the_switch_for_online_recruitment_is_what_is_recommended(
@@ -203,72 +159,6 @@ def changed(text: str, old: str, new: str) -> str:
     return text.replace(old, new)
 
 
-SMALL_WINDOWS = '[display]\ncalibrate = "off"\nminimum_width_px = 1\n'
-DECLARED_FAULTS = {
-    "a title to fill in": ("placeholders", "# Ratings of clips", "# [Title]", "texts.en.consent"),
-    "a doubtful mark": ("placeholders", "Ada Lovelace", "<name>", "texts.en.consent"),
-    "a mark in a question": ("placeholders", '"Age"', '"TODO"', "forms.1.fields.1.label.en"),
-    "no contact": ("contact", "Ada Lovelace, ada@example.org", "ask us", "texts.en.consent"),
-    "no time": ("time", "about 5 minutes", "not long", "texts.en.consent"),
-    "far too little time": ("time", "about 5 minutes", "60 minutes", "texts.en.consent"),
-    "low pay": ("pay", "£1.50", "5 pence to £0.05", "texts.en.consent"),
-    "low pay per hour": ("pay", "£1.50", "£3 per hour", "texts.en.consent"),
-    "a text without translation": ("translations", ', de = "sehr"', "", "trial.scale.high"),
-    "small windows": ("clip_size", "[trial]\n", f"{SMALL_WINDOWS}[trial]\n", "display"),
-}
-
-
-@pytest.mark.parametrize("fault", DECLARED_FAULTS)
-def test_a_planted_fault_of_the_declaration_is_named_with_its_place(
-    owner: Admin, services: Services, tmp_path: Path, fault: str
-) -> None:
-    kind, old, new, path = DECLARED_FAULTS[fault]
-    add_study(services, tmp_path / "fine", READY, name="fine", status="draft")
-    add_study(services, tmp_path / "clips", changed(READY, old, new), status="draft")
-
-    def of_kind(name: str) -> list[Any]:
-        return [one for one in owner.get(f"/studies/{name}/launch-checks").json() if one["kind"] == kind]
-
-    fine = of_kind("fine")
-    (found,) = [one for one in of_kind("short") if one not in fine]
-    assert found["page"] == "build"
-    assert found["path"].startswith(path)
-
-
-def add_rehearsal(services: Services, status: str, version: int, message: str = "") -> None:
-    with services.database.write() as session:
-        study = session.query(Study).one()
-        made = {"public_id": "rehearsal", "parameters": {"version": version}, "message": message}
-        session.add(Job(study_id=study.id, kind="rehearsal", status=status, **made))
-
-
-def test_planted_faults_of_settings_plan_rehearsal_and_server_are_named_until_they_are_fixed(
-    owner: Admin, services: Services, tmp_path: Path
-) -> None:
-    add_study(services, tmp_path / "clips", READY, status="draft")
-
-    def kinds() -> set[str]:
-        return {one["kind"] for one in owner.get("/studies/short/launch-checks").json()}
-
-    assert {"quota", "recruiter", "plan", "rehearsal", "not_tried", "backups", "address"} <= kinds()
-    revision = owner.get("/studies/short").json()["summary"]["revision"]
-    body: dict[str, Any] = {"revision": revision, "paused": True, "quota": 3, "recruiter": None}
-    assert owner.send("PUT", "/studies/short/settings", body).status_code == 200
-    (quota,) = advice(owner, "quota")
-    assert "closes after 3 complete runs, but the design plans 20 participants" in quota
-    assert "paused" in kinds()
-    body |= {"revision": revision + 1, "paused": False, "quota": 20}
-    assert owner.send("PUT", "/studies/short/settings", body).status_code == 200
-    assert owner.send("POST", "/studies/short/seal", {}).status_code == 201
-    add_rehearsal(services, "done", version=1)
-    assert not {"paused", "quota", "plan", "rehearsal"} & kinds()
-    with services.database.write() as session:
-        session.query(Job).delete()
-    add_rehearsal(services, "failed", version=1, message="out of memory")
-    (rehearsal,) = advice(owner, "rehearsal")
-    assert "The last rehearsal failed: out of memory." in rehearsal
-
-
 def test_a_completed_preview_is_a_trial_of_the_version(
     owner: Admin, client: TestClient, services: Services, tmp_path: Path
 ) -> None:
@@ -278,17 +168,6 @@ def test_a_completed_preview_is_a_trial_of_the_version(
     person.answer_all()
     assert person.request("POST", "/complete").status_code == 200
     assert advice(owner, "not_tried") == []
-
-
-def test_a_full_disk_is_named(
-    owner: Admin, services: Services, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    add_study(services, tmp_path / "clips", READY, status="draft")
-    assert advice(owner, "disk") == []
-    monkeypatch.setattr("server.operations.doctor.LEAST_FREE_BYTES", 1 << 60)
-    (disk,) = advice(owner, "disk")
-    assert "GB free" in disk
-    assert "free disk space" in disk.lower()
 
 
 def test_folders_of_the_server_are_not_shown() -> None:
@@ -319,7 +198,7 @@ def flip_byte(services: Services, sha256: str) -> None:
 
 
 def declare_frames(services: Services, sha256: str) -> None:
-    _declare(services, sha256, frames=9)
+    declare_clip(services, sha256, frames=9)
 
 
 def declare_other_bytes(services: Services, sha256: str) -> None:
@@ -327,10 +206,10 @@ def declare_other_bytes(services: Services, sha256: str) -> None:
     data = b"no video" * 64
     other = hashlib.sha256(data).hexdigest()
     services.clips.add(io.BytesIO(data), other)
-    _declare(services, sha256, sha256=other, bytes=len(data))
+    declare_clip(services, sha256, sha256=other, bytes=len(data))
 
 
-def _declare(services: Services, clip: str, **values: Any) -> None:
+def declare_clip(services: Services, clip: str, **values: Any) -> None:
     with services.database.write() as session:
         version = session.query(StudyVersion).one()
         clips = [one | (values if one["sha256"] == clip else {}) for one in version.manifest["clips"]]
