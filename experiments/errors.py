@@ -40,6 +40,17 @@ TYPES = {
     "model_type": "a table",
     "model_attributes_type": "a table",
 }
+PATTERNS = {
+    r"^[A-Za-z][A-Za-z0-9_]{0,39}$": "a name of letters, digits and underscores that begins with a letter",
+    r"^[^/\x00-\x1f]{1,60}$": "1 to 60 characters without a slash",
+    r"^[a-z]{2}(-[A-Z]{2})?$": "a language such as en or pt-BR",
+    r"^(https?://\S+|[A-Za-z0-9][A-Za-z0-9.+-]{1,60})$": "a license such as CC-BY-4.0, or its web address",
+    r"^\d{4}-\d{4}-\d{4}-\d{3}[\dX]$": "an ORCID such as 0000-0002-1825-0097",
+    r"^#[0-9a-f]{6}$": "a color such as #808080",
+    r"^[^\x00-\x1f]{1,600}$": "a line of 1 to 600 characters",
+    r"^(turn|link|form:[A-Za-z][A-Za-z0-9_]{0,39})$": "turn, link, or form: and the name of a form",
+}
+"""What the regular expressions of the declaration demand, in words."""
 LIMITS: dict[str, Callable[[Context], str]] = {
     "literal_error": lambda limit: _one_of(str(limit["expected"])),
     "greater_than": lambda limit: f"more than {_number(limit['gt'])}",
@@ -47,7 +58,9 @@ LIMITS: dict[str, Callable[[Context], str]] = {
     "less_than": lambda limit: f"less than {_number(limit['lt'])}",
     "less_than_equal": lambda limit: f"at most {_number(limit['le'])}",
     "multiple_of": lambda limit: f"a multiple of {_number(limit['multiple_of'])}",
-    "string_pattern_mismatch": lambda limit: f"a text that matches {limit['pattern']}",
+    "string_pattern_mismatch": lambda limit: PATTERNS.get(
+        str(limit["pattern"]), f"a text that matches {limit['pattern']}"
+    ),
     "string_too_short": lambda limit: f"a text of {counted(limit['min_length'], 'character')} or more",
     "string_too_long": lambda limit: f"a text of at most {counted(limit['max_length'], 'character')}",
     "too_short": lambda limit: f"a list of {counted(limit['min_length'], 'item')} or more",

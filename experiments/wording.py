@@ -274,8 +274,18 @@ def untranslated(declared: Experiment) -> dict[str, list[str]]:
 # What a consent text promises: whom to contact, how long it takes, what is paid.
 
 _CONTACT = re.compile(r"[^\s@<>]+@[^\s@<>]+\.\w{2,}|https?://\S+|\+?\d[\d ()/-]{6,}\d")
+_NUMBERS = {
+    "en": "one two three four five six seven eight nine ten eleven twelve",
+    "de": "eine zwei drei vier fünf sechs sieben acht neun zehn elf zwölf",
+}
+_SPELLED = {word: number for words in _NUMBERS.values() for number, word in enumerate(words.split(), 1)} | {
+    "fifteen": 15, "twenty": 20, "thirty": 30, "forty": 40,
+    "fünfzehn": 15, "zwanzig": 20, "dreißig": 30, "vierzig": 40,
+}  # fmt: skip
+"""Numbers that a text may spell out."""
+_NUMBER = rf"(\d+|\b(?:{'|'.join(_SPELLED)})\b)"
 _MINUTES = re.compile(
-    r"(\d+)(?:\s*(?:-|–|to|bis|à|a|do|tot)\s*(\d+))?\s*(?:min(?:ut)?\w*\b|分)", re.IGNORECASE
+    rf"{_NUMBER}(?:\s*(?:-|–|to|bis|à|a|do|tot)\s*{_NUMBER})?\s*(?:min(?:ut)?\w*\b|分)", re.IGNORECASE
 )
 _SIGNS = {"£": "£", "gbp": "£", "pound": "£", "$": "$", "usd": "$", "dollar": "$"} | {
     "€": "€", "eur": "€", "euro": "€"
@@ -318,8 +328,11 @@ def stated_minutes(text: str) -> int | None:
 
     >>> stated_minutes("10 to 15 minutes."), stated_minutes("Dauer: 20 Minuten"), stated_minutes("short")
     (15, 20, None)
+    >>> stated_minutes("It takes about two minutes."), stated_minutes("zehn bis fünfzehn Minuten")
+    (2, 15)
     """
-    minutes = [int(number) for match in _MINUTES.finditer(text) for number in match.groups() if number]
+    spelled = [number for match in _MINUTES.finditer(text) for number in match.groups() if number]
+    minutes = [_SPELLED.get(number.lower()) or int(number) for number in spelled]
     return max(minutes, default=None)
 
 

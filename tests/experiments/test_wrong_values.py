@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 import tomli_w
 
-from experiments.errors import wrong_value
+from experiments.declaration.experiment import Experiment
+from experiments.errors import PATTERNS, wrong_value
 from experiments.load import DefinitionError, locate, parse_experiment
 from tests.conftest import REPOSITORY
 
@@ -135,3 +136,14 @@ def test_what_earlier_versions_took_is_still_read_where_there_are_data_by_it() -
     with pytest.raises(DefinitionError, match="participants: expected a whole number"):
         parse_experiment(quoted)
     assert parse_experiment(quoted, has_data=True) == parse_experiment(text)
+
+
+def test_no_answer_shows_a_regular_expression() -> None:
+    assert (
+        set(re.findall(r"'pattern': '(.*?)'[,}]", str(Experiment.model_json_schema())))
+        - {pattern.replace("\\", "\\\\") for pattern in PATTERNS}
+        == set()
+    )
+    text = (REPOSITORY / "experiments/pairs-demo.toml").read_text(encoding="utf-8")
+    with pytest.raises(DefinitionError, match="expected a name of letters"):
+        parse_experiment(re.sub(r'name = "[^"]*"', 'name = ""', text, count=1))
