@@ -4,7 +4,7 @@ import { join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { describe, expect, it } from "vitest";
 import declared from "../../src/api/declaration.json";
-import { FORMS, inLanguages } from "../../src/admin/builder/bank";
+import { CONSENTS, FORMS, inLanguages, unfilledMarks, withKnown } from "../../src/admin/builder/bank";
 import {
   type Data,
   freeName,
@@ -16,6 +16,7 @@ import {
   valueAt,
   storedName,
   withDerivedName,
+  withFirstFactor,
   withMoved,
   withValue,
   suggestionsFor,
@@ -424,5 +425,32 @@ describe("buttons that add to a list", () => {
   it("name one of it, for every list of a declaration", () => {
     const one = ["languages", "factors", "series", "categories", "own per", "exclusions", "choices", "verdicts"].map(singularOf);
     expect(one).toEqual(["language", "factor", "series", "category", "own per", "exclusion", "choice", "verdict"]);
+  });
+});
+
+describe("what a form begins with", () => {
+  const levels = (...names: string[]) => names.map((name) => ({ name }));
+  const data: Data = {
+    factors: [
+      { name: "face", levels: levels("ada") },
+      { name: "speed", levels: levels("50", "75") },
+    ],
+    trial: { stimulus: { factor: "speed" } },
+  };
+
+  it("names the first factor where one is required, and offers the levels of the chosen one", () => {
+    expect(withFirstFactor(data, ["trial", "pairs"], { among: "within", factor: "" })).toEqual({ among: "within", factor: "face" });
+    expect(withFirstFactor(data, ["trial", "pairs"], { among: "all" })).toEqual({ among: "all" });
+    expect(suggestionsFor(data, ["trial", "task", "standard"])).toEqual(["50", "75"]);
+  });
+
+  it("fills a consent template with what the study says, and lists what is left", () => {
+    const [online = ""] = Object.values(CONSENTS["en"] ?? {});
+    const text = withKnown(online, { title: "Smiles & $1", minutes: "7" });
+    expect(text).toContain("# Smiles & $1");
+    expect(text).toContain("about 7 minutes");
+    expect(unfilledMarks(text)).toEqual(["[topic]", "[name, institution, e-mail]", "[number]"]);
+    expect(withKnown("# [Titel], [Minuten]", { title: "", minutes: "" })).toBe("# [Titel], [Minuten]");
+    expect(unfilledMarks("See [our page](https://example.org).")).toEqual([]);
   });
 });

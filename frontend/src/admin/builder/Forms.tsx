@@ -2,7 +2,7 @@
 
 import { Button, FileButton, Group, Menu, Stack, Text, Paper, SegmentedControl, SimpleGrid, Textarea } from "@mantine/core";
 import { downloadText, notify } from "../ui/useChange";
-import { FORMS, inLanguages, CONSENTS } from "./bank";
+import { FORMS, inLanguages, CONSENTS, unfilledMarks, withKnown } from "./bank";
 import { isTable, listAt, textAt, labelOf, type Path } from "./data";
 import { Field, named } from "./fields/Field";
 import { EXPERIMENT, type Editor, editorOf } from "./schema";
@@ -131,24 +131,32 @@ function ConsentMenu({ language }: { language: string }) {
   const builder = useBuilderHere();
   const texts = CONSENTS[language] ?? {};
   if (Object.keys(texts).length === 0) return null;
+  const { data, design } = builder;
+  const known = {
+    title: textAt(data, ["participant_title", language]) || textAt(data, ["title"]),
+    minutes: design === null ? "" : String(Math.max(1, Math.round(design.expected_minutes))),
+  };
+  const marks = unfilledMarks(textAt(data, ["texts", language, "consent"]));
   return (
     <Group>
       <Menu position="bottom-start">
         <Menu.Target>
           <Button size="xs" variant="light">
-            Begin the consent with ▾
+            Use a consent template ▾
           </Button>
         </Menu.Target>
         <Menu.Dropdown>
           {Object.entries(texts).map(([title, text]) => (
-            <Menu.Item key={title} onClick={() => builder.set(["texts", language, "consent"], text)}>
+            <Menu.Item key={title} onClick={() => builder.set(["texts", language, "consent"], withKnown(text, known))}>
               {title}
             </Menu.Item>
           ))}
         </Menu.Dropdown>
       </Menu>
       <Text size="xs" c="dimmed">
-        Fill in the words in [brackets]. Undo restores the text.
+        {marks.length > 0
+          ? `Still to fill in: ${marks.join(", ")}.`
+          : "A template has words in [brackets], which are listed here until they are filled in. Undo restores the text."}
       </Text>
     </Group>
   );

@@ -12,7 +12,7 @@ import { DesignLine, TomlText } from "../studies/Design";
 import { TurnedAway } from "../studies/StatusBadge";
 import { onDemand } from "../ui/Answer";
 import { useChange } from "../ui/useChange";
-import { type Data, isTable, type Section } from "./data";
+import { type Data, isTable, placeOf, type Section } from "./data";
 import { Field } from "./fields/Field";
 import { Forms, Texts } from "./Forms";
 import { type Meeting, type MeetingEdit, placeName, withChange } from "./history";
@@ -44,13 +44,13 @@ function JudgedEdit({ detail, builder }: { detail: Schemas["StudyDetail"]; build
   });
   if (data === undefined || data.changes.length === 0) return null;
   return (
-    <Alert color={data.begins_series ? "yellow" : "blue"} variant="light" title={title(data)} role="status">
+    <Alert color={data.begins_series ? "yellow" : "blue"} variant="light" title={title(data, detail)} role="status">
       {effect(data, detail)}
       <List size="sm" mt="xs">
         {data.changes.map((change) => (
           <List.Item key={change.path}>
-            {change.text}
-            {change.effect === "wording" ? " (wording)" : ""}
+            {inWords(change)}
+            {data.begins_series && change.effect === "wording" ? " (wording)" : ""}
           </List.Item>
         ))}
       </List>
@@ -58,13 +58,25 @@ function JudgedEdit({ detail, builder }: { detail: Schemas["StudyDetail"]; build
   );
 }
 
+/** "The text “Consent” in English: A becomes B", of a text that names the key as the TOML has it. */
+function inWords({ path, text }: Schemas["JudgedEdit"]["changes"][number]): string {
+  if (!text.startsWith(path)) return text;
+  const name = placeOf(path.split("."));
+  return `${name.charAt(0).toUpperCase()}${name.slice(1)}${text.slice(path.length)}`;
+}
+
 /** What is saved, and judged before: the text, and the clips if some were moved. */
 function editOf({ toml, data, places, moved }: Builder): Schemas["EditedVersion"] {
   return { toml, places: moved && places !== null ? placesToSave(places, data) : null };
 }
 
-function title(edit: Schemas["JudgedEdit"]): string {
+/** Whether nobody has taken part in any version, so that nothing can be pooled or kept apart. */
+const isUntouched = (edit: Schemas["JudgedEdit"], detail: Schemas["StudyDetail"]) =>
+  edit.runs === 0 && elsewhere(detail, edit.present_series) === "";
+
+function title(edit: Schemas["JudgedEdit"], detail: Schemas["StudyDetail"]): string {
   if (edit.begins_series) return "Saving starts a new data series";
+  if (isUntouched(edit, detail)) return "Not saved yet";
   return edit.series === edit.present_series ? "Answers may be pooled" : `Answers join series ${edit.series}`;
 }
 
@@ -94,7 +106,9 @@ function effect(edit: Schemas["JudgedEdit"], detail: Schemas["StudyDetail"]): st
   if (edit.begins_series) return `This changes what is measured. ${consequence(edit, detail)}`;
   if (edit.runs === 0) {
     const others = elsewhere(detail, edit.present_series);
-    return others === "" ? "No one has taken part yet." : `Series ${edit.present_series} has no runs yet; ${others}.`;
+    return others === ""
+      ? "Saving makes a new version of the draft. No one has taken part yet, so no answers are affected."
+      : `Series ${edit.present_series} has no runs yet; ${others}.`;
   }
   return `Further runs belong to series ${edit.series}.`;
 }
@@ -260,7 +274,7 @@ function Page({ study, section, rendered }: { study: string; section: Section; r
     <Stack gap="sm">
       {section.id === "trial" && <TrialPreview />}
       {section.id === "factors" && builder.places !== null && <LevelGrid study={study} />}
-      {section.id === "screen" && <TurnedAway design={builder.design ?? undefined} />}
+      {section.id === "screen" && <TurnedAway study={study} design={builder.design ?? undefined} />}
       {keys
         .map((key) => [key, EXPERIMENT.properties?.[key]] as const)
         .map(([key, schema]) =>

@@ -1,5 +1,7 @@
 /** A declaration as plain data, changed without changing what was there before. */
 
+import { languageName, words } from "../ui/format";
+
 export type Path = readonly (string | number)[];
 export type Data = Record<string, unknown>;
 
@@ -80,6 +82,31 @@ export function labelOf(key: string): string {
 
 const IRREGULAR: Record<string, string> = { series: "series", stimuli: "stimulus" };
 
+// Places of a declaration in words.
+
+const NOUNS: Readonly<Record<string, string>> = {
+  factors: "factor",
+  levels: "level",
+  forms: "questionnaire",
+  fields: "question",
+  options: "answer",
+  scales: "scale",
+  series: "series",
+  screening: "screening rule",
+  exclusions: "exclusion rule",
+  rules: "rule",
+};
+/** The values at a path, the innermost first. */
+export function placeOf([part = "", name, ...rest]: string[]): string {
+  if (part === "texts" && name !== undefined) return `the text “${labelOf(rest.join(" "))}” in ${languageName(name)}`;
+  const noun = NOUNS[part];
+  const [here, inner] =
+    noun !== undefined && name !== undefined
+      ? [`the ${noun} ${words(name)}`, rest]
+      : [`“${labelOf(part)}”`, name === undefined ? [] : [name, ...rest]];
+  return inner.length === 0 ? here : `${placeOf(inner)} of ${here}`;
+}
+
 /** One of several: "factors" are made of factors, "categories" of categories, and a series is one of "series". */
 export function singularOf(plural: string): string {
   const words = plural.split(" ");
@@ -150,6 +177,28 @@ const KNOWN: Record<string, string[]> = {
 const FACTORS = ["exemplars.own_per", "blocks.split_by", "analysis.factors", "analysis.pairs", "trial.pairs.factor"];
 const CELLS = ["trial.reference.cell", "trial.pairs.cells.cell", "trial.pairs.cells.other"];
 
+/** Keys that name a level, each with the key that names its factor. */
+const LEVEL_OF: Record<string, Path> = {
+  "trial.task.standard": ["trial", "stimulus", "factor"],
+  "trial.reference.level": ["trial", "reference", "factor"],
+};
+
+function levelNames(data: Data, factor: string): string[] {
+  return namesOf(
+    listAt(
+      listAt(data, ["factors"]).find((one) => textAt(one, ["name"]) === factor),
+      ["levels"],
+    ),
+  );
+}
+
+/** A table that begins: where it must name a factor, the first one. */
+export function withFirstFactor(data: Data, path: Path, table: Data): Data {
+  const [first] = factorNames(data);
+  const isOpen = table["factor"] === "" && suggestionsFor(data, [...path, "factor"]).length > 0;
+  return isOpen && first !== undefined ? { ...table, factor: first } : table;
+}
+
 function namesOf(elements: readonly unknown[]): string[] {
   return elements.map((element) => textAt(element, ["name"])).filter((name) => name !== "");
 }
@@ -174,6 +223,7 @@ export function suggestionsFor(data: Data, path: Path): string[] {
   if (end !== undefined) return end;
   if (FACTORS.includes(key) || key.endsWith(".factor") || key.endsWith(".factors")) return factorNames(data);
   if (CELLS.includes(key)) return cellNames(data);
+  if (LEVEL_OF[key] !== undefined) return levelNames(data, textAt(data, LEVEL_OF[key]));
   if (key.startsWith("screening.")) return ofForms(data, key, path.slice(0, 2));
   return [];
 }

@@ -7,8 +7,8 @@ import { api, type Schemas, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { CopyId } from "../ui/CopyId";
 import { DataTable } from "../ui/DataTable";
-import { labelOf } from "../builder/data";
-import { counted, languageName, when, words } from "../ui/format";
+import { placeOf } from "../builder/data";
+import { counted, when } from "../ui/format";
 
 export function CompareVersions({ detail }: { detail: Schemas["StudyDetail"] }) {
   const study = detail.summary.name;
@@ -78,18 +78,6 @@ function verdict({ keys, clips_differing, pooled }: Schemas["Comparison"]): stri
     : "They differ in what they measure or in their clips. Their answers are kept separate.";
 }
 
-const NOUNS: Readonly<Record<string, string>> = {
-  factors: "factor",
-  levels: "level",
-  forms: "questionnaire",
-  fields: "question",
-  options: "answer",
-  scales: "scale",
-  series: "series",
-  screening: "screening rule",
-  exclusions: "exclusion rule",
-  rules: "rule",
-};
 const MAX_VALUE = 60;
 
 /** "Changed “Minimum” of the question age of the questionnaire about from 18 to 16." */
@@ -101,17 +89,6 @@ export function sentenceOf({ path, pieces }: Pick<Schemas["KeyDifference"], "pat
   if (after === "") return `Removed ${what}.`;
   const isShort = [before, after].every((value) => value.length <= MAX_VALUE && !/[{\n]/.test(value));
   return `Changed ${what}${isShort ? ` from ${before} to ${after}` : ""}.`;
-}
-
-/** The values at a path, the innermost first. */
-function placeOf([part = "", name, ...rest]: string[]): string {
-  if (part === "texts" && name !== undefined) return `the text “${labelOf(rest.join(" "))}” in ${languageName(name)}`;
-  const noun = NOUNS[part];
-  const [here, inner] =
-    noun !== undefined && name !== undefined
-      ? [`the ${noun} ${words(name)}`, rest]
-      : [`“${labelOf(part)}”`, name === undefined ? [] : [name, ...rest]];
-  return inner.length === 0 ? here : `${placeOf(inner)} of ${here}`;
 }
 
 function Words({ piece: { kind, text } }: { piece: Schemas["Piece"] }) {

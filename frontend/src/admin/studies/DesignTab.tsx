@@ -26,7 +26,7 @@ export function DesignTab() {
             </Card>
           )}
           <Design design={detail.design} />
-          {!isAhead(detail.summary) && <TurnedAway design={detail.design} />}
+          {!isAhead(detail.summary) && <TurnedAway study={study} design={detail.design} />}
           <Accordion variant="contained">
             <Accordion.Item value="toml">
               <Accordion.Control>Definition (TOML)</Accordion.Control>

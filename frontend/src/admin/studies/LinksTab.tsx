@@ -24,7 +24,7 @@ export function LinksTab() {
   const rows = links.data?.pages.flatMap((page) => page.links) ?? [];
   return (
     <Stack>
-      <TurnedAway design={detail?.design} />
+      <TurnedAway study={study} design={detail?.design} />
       <NewLinks study={study} />
       <PagedAnswer of={links} shown={rows.length} total={links.data?.pages.at(-1)?.total} more="More links">
         <LinkTable study={study} rows={rows} recruiter={detail?.recruiter ?? null} owns={detail?.summary.rights.includes("own") ?? false} />

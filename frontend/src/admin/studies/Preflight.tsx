@@ -40,7 +40,7 @@ export function Preflight({ study, atOnce = false, override }: Props) {
             <Text fw={600}>{summaryOf(findings)}</Text>
             <Findings study={study} findings={findings} />
             <ClipsTried study={study} version={version} check={clips} />
-            <TurnedAway design={detail?.design} />
+            <TurnedAway study={study} design={detail?.design} />
             {override !== undefined && (
               <Checkbox
                 label="Set live with these clips anyway. The audit log records it."

@@ -12,9 +12,23 @@ export function StatusBadge({ status }: { status: Schemas["StudySummary"]["statu
   return <Badge color={COLOURS[status]}>{status}</Badge>;
 }
 
-/** Devices that can take no part, said before somebody sends them a link. */
-export function TurnedAway({ design }: { design: Schemas["DesignOut"] | undefined }) {
-  return design?.turned_away ? <Text size="sm">{design.turned_away}</Text> : null;
+const SCREEN_PAGE = "Screen and playback";
+
+/** Devices that can take no part, said before somebody sends them a link; the page that changes it is a link. */
+export function TurnedAway({ study, design }: { study: string; design: Schemas["DesignOut"] | undefined }) {
+  if (!design?.turned_away) return null;
+  const [before = "", after] = design.turned_away.split(SCREEN_PAGE);
+  return (
+    <Text size="sm">
+      {before}
+      {after !== undefined && (
+        <Link to="/studies/$study/build" params={{ study }} search={{ section: "screen" }}>
+          {SCREEN_PAGE}
+        </Link>
+      )}
+      {after}
+    </Text>
+  );
 }
 
 // Where a study is between draft and live, and what comes next.

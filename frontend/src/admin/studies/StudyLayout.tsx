@@ -46,7 +46,7 @@ function OpenedDialog({ study, onClose }: Props) {
                 url={addressFor(url, recruiter)}
               />
             )}
-            <TurnedAway design={detail?.design} />
+            <TurnedAway study={study} design={detail?.design} />
             <Text size="sm" c="dimmed">
               Personal links, quotas and completion codes are under{" "}
               <Link to="/studies/$study/links" params={{ study }} onClick={onClose}>

@@ -38,7 +38,8 @@ export function ConfirmButton({
       </Button>
       <Modal opened={opened} onClose={close} title={label} size={wide ? "lg" : "md"} closeButtonProps={{ "aria-label": "Close" }}>
         <Text>{question}</Text>
-        {children}
+        {/* A link leads to a page, perhaps the one under this dialog: it closes. */}
+        <div onClickCapture={(event) => event.target instanceof Element && event.target.closest("a") !== null && close()}>{children}</div>
         <Group justify="flex-end" mt="md" className="dialog-actions">
           <Button variant="default" onClick={close}>
             Cancel

@@ -17,6 +17,7 @@ import {
   tableAt,
   keyName,
   valueAt,
+  withFirstFactor,
 } from "../data";
 import {
   editorOf,
@@ -372,8 +373,19 @@ function Variants(props: FieldProps) {
         allowDeselect={false}
         clearable={optional}
         data={Object.keys(editor.variants).map((tag) => ({ value: tag, label: tag.replaceAll("_", " ") }))}
+        renderOption={({ option }) => (
+          <div>
+            {option.label}
+            <Text size="xs" c="dimmed">
+              {helpOf(resolved(editor.variants[option.value] ?? {}))}
+            </Text>
+          </div>
+        )}
         value={variant === undefined ? null : chosen}
-        onChange={(tag) => set(tag === null ? undefined : starterOf(editor, tag, builder.languages, table))}
+        onChange={(tag) => {
+          if (tag === null) set(undefined);
+          else set(withFirstFactor(builder.data, props.path, starterOf(editor, tag, builder.languages, table)));
+        }}
       />
       {keys?.kind === "table" && <Keys key={chosen} path={props.path} editor={keys} but={[editor.tag]} />}
     </Stack>
