@@ -289,6 +289,7 @@ class Playground {
   private seed = 1;
   private gaze_deg = 0;
   private squint = 0;
+  private held = false;
   private engine = new BlinkEngine({ seed: 1 });
   private timer = new UniformTimer();
   private began_ms: number | null = null;
@@ -330,6 +331,7 @@ class Playground {
   /** Start over with the values of the sliders: the same seed gives the same blinks. */
   private restart(): void {
     this.engine = new BlinkEngine({ seed: this.seed, state: this.state, parameters: this.parameters });
+    this.engine.holdBlinks(this.held);
     this.timer = new UniformTimer();
     this.began_ms = null;
     for (const { trace } of this.sides) trace.clear();
@@ -349,6 +351,12 @@ class Playground {
       this.seed = Math.max(0, Math.trunc(seed.valueAsNumber) || 0);
       this.restart();
     });
+    const held = element("input", "");
+    held.type = "checkbox";
+    held.addEventListener("change", () => {
+      this.held = held.checked;
+      this.engine.holdBlinks(this.held);
+    });
     const events = EVENTS.map(([kind, label]) =>
       button(label, () => this.engine.notify({ kind, time_s: 0, ...(kind === "gaze_shift" ? { amplitude_deg: 30 } : {}) })),
     );
@@ -356,6 +364,7 @@ class Playground {
       states,
       labelled("Seed", seed),
       ...events,
+      labelled("Eyes stay open (flag)", held),
       button("Start again", () => this.restart()),
       button("Defaults", () => this.reset()),
       button("Save 60 s as CSV", () => this.save()),

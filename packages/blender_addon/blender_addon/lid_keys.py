@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from blink_engine import Event, Performance, StateChange, StateName, default_parameters, perform
+from blink_engine import Event, Hold, Performance, StateChange, StateName, default_parameters, perform
 
 Density = Literal["EVERY_FRAME", "FEW"]
 Array = npt.NDArray[np.float64]
@@ -31,6 +31,13 @@ class Passage:
     seed: int
     state: StateName
     rate_per_minute: float | None = None
+    holds: tuple[Hold, ...] = ()
+
+
+def flag_holds(up: npt.NDArray[np.bool_], fps: float) -> tuple[Hold, ...]:
+    """When a flag is up that has a value a frame: from its first frame to the first one after it."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]]).astype(int)))
+    return tuple(Hold(first / fps, after / fps) for first, after in edges.reshape(-1, 2).tolist())
 
 
 def passage(asked: Passage, events: Sequence[Event] = (), changes: Sequence[StateChange] = ()) -> Performance:
@@ -49,6 +56,7 @@ def passage(asked: Passage, events: Sequence[Event] = (), changes: Sequence[Stat
         state=asked.state,
         events=events,
         changes=changes,
+        holds=asked.holds,
         parameters=parameters,
         ends_open=True,
     )

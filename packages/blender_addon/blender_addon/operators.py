@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 
 from blender_addon.channels import Channel, clear_keys, write_keys
-from blender_addon.lid_keys import Array, Passage, blink_at, lid_keys, one_blink, passage
+from blender_addon.lid_keys import Array, Passage, blink_at, flag_holds, lid_keys, one_blink, passage
 from blender_addon.rig import RigError, chosen_channels, rig_guesses
 from blender_addon.sound import read_sound
 from blender_addon.voice import speech_in_samples
@@ -176,8 +176,15 @@ def _passage(scene: Any, rig: Any) -> Passage:
         if scene.use_preview_range
         else (scene.frame_start, scene.frame_end)
     )
-    rate = settings.rate or None
-    return Passage(start, end, frames_per_second(scene), _seed(rig), settings.state, rate)
+    rate, fps = settings.rate or None, frames_per_second(scene)
+    keyed = Channel(rig, "palpebra.hold", -1, 0.0, 1.0, "the flag").curve()
+    # Without keys the flag is as it is set, over the whole range.
+    up = [keyed.evaluate(frame) >= 0.5 if keyed else settings.hold for frame in range(start, end + 1)]
+    if up and all(up):
+        raise RigError(
+            "'Eyes stay open' is on in the whole range, so no blink can come; key it, or turn it off"
+        )
+    return Passage(start, end, fps, _seed(rig), settings.state, rate, flag_holds(np.array(up, bool), fps))
 
 
 def _write(

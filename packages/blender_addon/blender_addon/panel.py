@@ -20,7 +20,7 @@ class PALPEBRA_PT_blinks(bpy.types.Panel):  # noqa: N801 - Blender's rule for na
         settings = rig.palpebra
         _draw_names(layout.box(), rig, settings)
         box = layout.box()
-        for name in ("state", "rate", "seed", "density", "replace"):
+        for name in ("state", "rate", "seed", "hold", "density", "replace"):
             box.prop(settings, name)
         column = layout.column(align=True)
         column.operator("palpebra.blink", icon="KEY_HLT")

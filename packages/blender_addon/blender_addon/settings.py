@@ -48,6 +48,11 @@ class PalpebraSettings(bpy.types.PropertyGroup):
         name="Blinks a minute", default=0.0, min=0.0, max=60.0, description="0 uses the rate of the state"
     )
     density: EnumProperty(name="Keys", items=DENSITIES, default="EVERY_FRAME")  # type: ignore[valid-type]
+    hold: BoolProperty(  # type: ignore[valid-type]
+        name="Eyes stay open",
+        default=False,
+        description="Key this flag: blinks come while it is off, and the eyes stay open while it is on",
+    )
     replace: BoolProperty(  # type: ignore[valid-type]
         name="Replace my own keys",
         default=False,

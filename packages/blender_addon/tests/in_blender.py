@@ -36,6 +36,7 @@ def main(zip_path, folder):
     speech(face, scene, folder)
     bones(scene)
     other_rigs(face)
+    flagged(face, scene)
     half_locked(face, scene)
     RESULTS["removed"] = removing(face)
     RESULTS["undone"] = undoing(face.name, scene)
@@ -124,6 +125,24 @@ def few(face, scene):
     bpy.ops.palpebra.fill()
     RESULTS["few"] = len(curve(face.data.shape_keys, "eyeBlinkLeft").keyframe_points)
     face.palpebra.density = "EVERY_FRAME"
+
+
+def flagged(face, scene):
+    """The flag keyed from frame 200 to 500, then on without keys."""
+    bpy.context.view_layer.objects.active = face
+    scene.frame_end, face.palpebra.state = 1200, "speaking"
+    for frame, up in ((1, False), (200, True), (501, False)):
+        face.palpebra.hold = up
+        face.palpebra.keyframe_insert("hold", frame=frame)
+    RESULTS["flag"] = called(bpy.ops.palpebra.fill)
+    left = curve(face.data.shape_keys, "eyeBlinkLeft")
+    RESULTS["flagged"] = [round(left.evaluate(frame), 6) for frame in range(1, 1201)]
+    face.palpebra.keyframe_delete("hold", frame=1)
+    face.palpebra.keyframe_delete("hold", frame=200)
+    face.palpebra.keyframe_delete("hold", frame=501)
+    face.palpebra.hold = True
+    RESULTS["flag_on"] = called(bpy.ops.palpebra.fill)
+    face.palpebra.hold, face.palpebra.state = False, "listening"
 
 
 def locked(face):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from addon_build.addon import build
 
-from blink_engine import perform
+from blink_engine import Hold, perform
 from blink_engine.speech import seed_of_speaker
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -87,8 +87,9 @@ def test_few_keys_are_fewer(used: dict[str, Any]) -> None:
         ("silence", "there is no speech in that recording"),
         ("no_file", "no such file; expected a sound file"),
         ("no_sound", "expected a sound file that Blender reads"),
-        ("bone_no_way", "set how far bone 'lid.T.L.002' goes"),
+        ("bone_no_way", "set how far bone 'lid.T.L.002' moves to close the eye"),
         ("quaternion", "set its rotation mode to XYZ Euler"),
+        ("flag_on", "'Eyes stay open' is on in the whole range"),
         ("no_lids", "no shape key or bone has a name for lids or blinks"),
         ("no_shapes", "choose what closes the left and the right eye"),
     ],
@@ -111,6 +112,22 @@ def test_one_undo_takes_back_what_a_button_did(used: dict[str, Any]) -> None:
         assert done == ["FINISHED"], button
         assert changed or button == "guess", button
         assert as_before, button
+
+
+def test_blinks_come_while_the_keyed_flag_is_off(used: dict[str, Any]) -> None:
+    assert used["flag"] == ["FINISHED"]
+    closure = np.array(used["flagged"])
+    assert (closure[199:500] == 0).all()
+    assert closure[500:700].max() > 0.3
+    engine = perform(
+        20.0,
+        60.0,
+        seed=seed_of_speaker(5, "Cube"),
+        state="speaking",
+        holds=[Hold(199 / 60, 500 / 60)],
+        ends_open=True,
+    )
+    assert closure == pytest.approx(engine.left, abs=1e-4)
 
 
 def test_speech_is_answered(used: dict[str, Any]) -> None:

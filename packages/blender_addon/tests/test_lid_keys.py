@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from blender_addon.lid_keys import Passage, blink_at, lid_keys, one_blink, passage
+from blender_addon.lid_keys import Passage, blink_at, flag_holds, lid_keys, one_blink, passage
+
+from blink_engine import Hold
 
 
 @pytest.mark.parametrize("fps", [24.0, 23.976, 60.0, 120.0])
@@ -11,6 +13,17 @@ def test_every_frame_is_the_curve(fps: float) -> None:
     keys = lid_keys(done.left, 1)
     frames = np.arange(1, done.left.size + 1)
     assert np.interp(frames, keys.frames, keys.values) == pytest.approx(done.left, abs=1e-6)
+
+
+def test_eyes_stay_open_while_the_flag_is_up() -> None:
+    up = np.zeros(600, bool)
+    up[:50] = up[200:400] = up[590:] = True
+    holds = flag_holds(up, 25.0)
+    assert holds == (Hold(0.0, 2.0), Hold(8.0, 16.0), Hold(23.6, 24.0))
+    assert flag_holds(np.zeros(5, bool), 25.0) == ()
+    done = passage(Passage(1, 600, 25.0, seed=7, state="speaking", holds=holds))
+    assert (done.left[up] == 0).all()
+    assert done.left[~up].max() > 0.5
 
 
 def test_few_keys_keep_onset_peak_and_end() -> None:
