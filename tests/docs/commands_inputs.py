@@ -159,6 +159,14 @@ def _write_tables(folder: Path, draw: random.Random) -> None:
     _write_csv(folder / "comparisons.csv", _comparisons(draw))
     _write_csv(folder / "trials.csv", _trials(draw))
     _write_csv(folder / "votes.csv", _votes(draw))
+    coders = itertools.product(range(100, 900, 40), ("anna", "ben"))
+    _write_csv(
+        folder / "coders.csv",
+        [
+            {"blink": blink, "coder": coder, "accepted": int(draw.random() < 0.9 if blink % 3 else 0)}
+            for blink, coder in coders
+        ],
+    )
     answers = []
     for person in PARTICIPANTS:
         level = draw.gauss(4, 1)

@@ -20,6 +20,7 @@ from typing import Any
 import pytest
 
 from server.core.locks import file_lock
+from tests.analysis.report.r_process import r_has
 from tests.conftest import REPOSITORY
 from tests.docs.commands_inputs import (
     take_part,
@@ -46,12 +47,11 @@ EXCEPTIONS = {
     "stimuli bake recording me.mp4 --out characters/me": (
         "needs a video of a person: in the generated one the detector sees no eye close fully"
     ),
-    "analysis run exp1 --csv exp1.csv --verify-with-r": (
-        "needs R with afex; tests/analysis/report/test_r_script.py runs it where R has it"
-    ),
     "analysis replicate p1203-acr --data downloads": "needs data that may not be shipped",
 }
 """Complete commands that cannot run here, and why."""
+if not r_has("afex", "car", "emmeans"):
+    EXCEPTIONS["analysis run exp1 --csv exp1.csv --verify-with-r"] = "needs R with afex"
 
 ENDS_WITH_1 = (
     "analysis check-paper",  # the paper's own figures have faults
