@@ -84,6 +84,21 @@ def test_an_avatar_is_given_the_engines_lids(context: BrowserContext, pages: Pat
         assert (left, right) == pytest.approx((frame.left, frame.right), abs=1e-4)
 
 
+def test_an_avatar_moves_between_blinks(context: BrowserContext, pages: Path) -> None:
+    opened = context.new_page()
+    opened.goto((pages / "vrm.html").as_uri())
+    opened.wait_for_selector("#said:not(:empty)")
+    open_eyes = "Number(document.querySelector('canvas').dataset.lidLeft) === 0"
+    pictures = []
+    while len(pictures) < 3:
+        opened.wait_for_function(open_eyes)
+        picture = opened.locator("canvas").screenshot()
+        # A blink may have begun meanwhile.
+        if opened.evaluate(open_eyes):
+            pictures.append(picture)
+    assert len(set(pictures)) == 3
+
+
 def test_a_file_that_is_not_an_avatar_is_refused_and_the_one_that_is_there_blinks_on(
     context: BrowserContext, pages: Path, tmp_path: Path
 ) -> None:

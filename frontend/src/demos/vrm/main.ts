@@ -1,7 +1,7 @@
 /** A VRM avatar that blinks by the engine: choose a .vrm file, or drop it onto the page. */
 import "./page.css";
 import { type VRM, VRMLoaderPlugin } from "@pixiv/three-vrm";
-import { Box3, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
+import { Box3, DirectionalLight, HemisphereLight, MathUtils, PerspectiveCamera, Scene, Vector3, WebGLRenderer } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { BlinkEngine } from "../../blink-engine";
 import { sampleHead } from "./sample-head";
@@ -33,6 +33,25 @@ async function take(model: ArrayBuffer): Promise<void> {
   camera.lookAt(centre);
 }
 
+const SWAY_HZ = [0.13, 0.31, 0.47, 0.83] as const;
+/** Turns of the head around x, y and z, in degrees: at the eyes about 1 mm. */
+const SWAY_DEG = [0.5, 0.8, 0.4] as const;
+const REST_S = 1.7;
+const [GAZE_ASIDE_DEG, GAZE_UP_DEG] = [3, 1.5];
+
+/** Motion between blinks: a head that sways, and eyes that look at another place every other second. */
+function sway(vrm: VRM, time_s: number): void {
+  const waves = SWAY_DEG.map((degrees, axis) =>
+    MathUtils.degToRad(degrees * SWAY_HZ.reduce((sum, rate) => sum + Math.sin(2 * Math.PI * rate * time_s + 9 * rate + 2 * axis), 0) * 0.7),
+  );
+  vrm.humanoid.getNormalizedBoneNode("head")?.rotation.set(waves[0] ?? 0, waves[1] ?? 0, waves[2] ?? 0);
+  if (!vrm.lookAt) return;
+  const rest = Math.floor(time_s / REST_S);
+  // The same places in each visit.
+  vrm.lookAt.yaw = GAZE_ASIDE_DEG * Math.sin(12.9 * rest * rest);
+  vrm.lookAt.pitch = GAZE_UP_DEG * Math.sin(78.2 * rest * rest + 1);
+}
+
 /** The lids of this moment, by the names that VRM gives them. */
 function blink(vrm: VRM, time_s: number): void {
   const { left, right } = engine.frame(time_s);
@@ -49,6 +68,7 @@ function start(canvas: HTMLCanvasElement, said: HTMLElement, chooser: HTMLInputE
   const tick = (now: number): void => {
     const time_s = Math.max(0, now - begun) / 1000;
     if (avatar !== null) {
+      sway(avatar, time_s);
       blink(avatar, time_s);
       canvas.dataset["time"] = String(time_s);
       for (const side of ["Left", "Right"]) canvas.dataset[`lid${side}`] = String(influence(avatar, `blink${side}`));
