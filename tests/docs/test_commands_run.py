@@ -13,9 +13,10 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
@@ -36,9 +37,6 @@ LIMIT_S = 1200
 DECIDED = ("decisions", "tutorials", "generated")  # records, pages with a test of their own, generated pages
 POSTGRESQL = "needs the reader's PostgreSQL; tests/server/operations/test_backup.py copies to one"
 EXCEPTIONS = {
-    "server restore s3://lab-backups/palpebra/palpebra-2026-01-31T030000.tar.age --identity backups.key": (
-        "needs the reader's object store; tests/server/operations/test_off_host.py restores from one"
-    ),
     "server database copy sqlite:///data/palpebra.sqlite postgresql://me@host/palpebra": POSTGRESQL,
     "DATABASE_URL=postgresql://me@host/palpebra server doctor": POSTGRESQL,
     "palpebra serve --domain lab.example.org": (
@@ -58,6 +56,39 @@ ENDS_WITH_1 = (
     "analysis synthesise exp1 --n 60 --effect blur:amplitude=12.5 --effect character=8",  # the page says so
 )
 """Commands that report something with exit code 1, as their pages say."""
+
+RESTORE_FROM_BUCKET = (
+    "server restore s3://lab-backups/palpebra/palpebra-2026-01-31T030000.tar.age --identity backups.key"
+)
+
+
+def back_up_to_bucket(folder: Path) -> None:
+    """The page's bucket, at a server of S3's protocol, with a backup of its name; the data are aside."""
+    moto = pytest.importorskip("moto.server", reason="moto is not installed")
+    boto3 = pytest.importorskip("boto3", reason="the extra s3 is not installed")
+    store = moto.ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    store.start()
+    host, port = store.get_host_and_port()
+    os.environ["PALPEBRA_S3_ENDPOINT"] = endpoint = f"http://{host}:{port}"
+    os.environ["AWS_ACCESS_KEY_ID"] = os.environ["AWS_SECRET_ACCESS_KEY"] = "test"
+    client = boto3.client("s3", endpoint_url=endpoint, region_name="us-east-1")
+    client.create_bucket(Bucket="lab-backups")
+    public = re.search(r"age1\w+", (folder / "backups.key").read_text(encoding="utf-8"))
+    assert public is not None
+    run_or_fail(f"server backup --to s3://lab-backups/palpebra --recipient {public[0]}", folder)
+    names = [entry["Key"] for entry in client.list_objects_v2(Bucket="lab-backups")["Contents"]]
+    (made,) = [name for name in names if name.endswith(".tar.age")]
+    printed = RESTORE_FROM_BUCKET.split()[2].removeprefix("s3://lab-backups/")
+    client.copy_object(Bucket="lab-backups", Key=printed, CopySource={"Bucket": "lab-backups", "Key": made})
+    run_or_fail("mkdir aside-2 && mv data/palpebra.sqlite* aside-2", folder)
+
+
+@pytest.fixture(autouse=True)
+def same_environment() -> Iterator[None]:
+    """What a page needs of the environment is not left to the next one."""
+    with mock.patch.dict(os.environ):
+        yield
+
 
 Step = str | Callable[[Path], None]
 RECIPES: dict[str, Step] = {
@@ -93,6 +124,7 @@ BEFORE: dict[str, Step] = {
     "stimuli clip --character characters/me/ --profile real --out try.mp4": (
         "stimuli bake recording me.mp4 me.csv --out characters/me"
     ),
+    RESTORE_FROM_BUCKET: back_up_to_bucket,
     "server restore backups/palpebra-monday.tar": "mkdir aside && mv data/palpebra.sqlite* aside",
     "server database go-back 2026-11-24T10:15:00Z": (
         "server database snapshot && cd data/snapshots && mv *.sqlite palpebra-2026-11-24T100000Z.sqlite"
