@@ -423,6 +423,44 @@ def verdict_on(signals: Signals, *, answers: int, refused: bool, tells: bool) ->
     return ("likely" if points >= LIKELY and _passes_checks(signals) and not doubted else "unclear"), points
 
 
+REASONS = {
+    "tickets": "Answers came without valid tickets.",
+    "digests": "The page did not show that it had fetched the clips.",
+    "clip_time": "The clips are longer than the time in which they were answered.",
+    "claimed_time": "Clips and response times are longer than the time in which they were answered.",
+    "order": "The clips were not played in their order.",
+    "interaction": "Most answers came without a key press or a click.",
+    "trusted": "Key presses or clicks were made by a script, or are not known.",
+    "press_ms": "Keys and buttons were held for no time, or it is not known for how long.",
+    "press_spread": "Every key or button was held for the same time.",
+    "rt_median": "Half of the answers came within 0.2 s.",
+    "rt_spread": "All answers took nearly the same time.",
+    "same_answer": "Nearly all answers are the same.",
+    "cycle": "The answers repeat in a fixed order.",
+    "checks": "Most attention questions were answered wrong.",
+    "motion_checks_guessed": "Motion checks were answered no better than by guessing.",
+}
+"""What speaks against a person, by the signal that takes points."""
+
+
+def reasons_against(judged: Judgement, *, refused: bool) -> list[str]:
+    """Why a run is not likely a person's, in sentences: the signals that took points, the heaviest first.
+
+    >>> signals = Signals(trusted=1, press_ms=80, rt_spread=0.05, checks_guessed=0.01)
+    >>> reasons_against(Judgement("unlikely", -5.0, signals), refused=False)
+    ['All answers took nearly the same time.']
+    """
+    if judged.verdict in ("likely", "not_judged"):
+        return []
+    taken = {name: points_of(name, getattr(judged.signals, name)) for name in REASONS}
+    reasons = [REASONS[name] for name in sorted(REASONS, key=lambda name: taken[name]) if taken[name] < 0]
+    if refused:
+        reasons.insert(0, "Answers were refused, because their evidence was wrong.")
+    if not _passes_checks(judged.signals):
+        reasons.append("Attention and motion checks do not show that a person answered.")
+    return reasons
+
+
 def _passes_checks(signals: Signals) -> bool:
     """Whether the run's attention and motion checks together are right more often than guesses."""
     return signals.checks_guessed is not None and signals.checks_guessed < ENOUGH_BY_CHANCE

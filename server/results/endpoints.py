@@ -39,6 +39,7 @@ from server.results.schemas import (
     MonitorSnapshot,
     Replay,
     ReplayedTrial,
+    RunEvidence,
     RunIdentity,
     RunPage,
     Show,
@@ -238,6 +239,13 @@ def get_identity(database: DatabaseDep, identity: Myself, study: str, run: str) 
     """Who the participant is to the recruiter; for owners of the study, and each look is in the audit log."""
     with database.write() as session:
         return run_service.identity(session, find_study(session, study, identity, "own"), run, identity)
+
+
+@run_router.get("/{run}/evidence")
+def get_evidence(database: DatabaseDep, identity: PersonalReader, study: str, run: str) -> RunEvidence:
+    """Whether the answers are likely a person's, and what speaks against it."""
+    with database.read() as session:
+        return monitor_service.evidence_of(session, find_study(session, study, identity, "export"), run)
 
 
 @run_router.put("/{run}/exclusion", status_code=204)

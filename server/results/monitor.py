@@ -12,10 +12,21 @@ from experiments.assignment.groups import names
 from experiments.declaration.experiment import Experiment
 from server.core.values import now
 from server.models import STAGES, Study
+from server.participation.evidence import reasons_against
+from server.participation.evidence_repository import has_refusals
+from server.participation.judgement import judge_run
 from server.participation.run_schemas import Origin
+from server.participation.visit_repository import find_run
 from server.results import monitor_repository
 from server.results.monitor_repository import MetRun, RunCount
-from server.results.schemas import FailingClip, FunnelStep, GroupCount, MonitoredRun, MonitorSnapshot
+from server.results.schemas import (
+    FailingClip,
+    FunnelStep,
+    GroupCount,
+    MonitoredRun,
+    MonitorSnapshot,
+    RunEvidence,
+)
 
 # The live monitor: runs, presence, funnel and expected finish of one study.
 
@@ -122,6 +133,14 @@ def monitored_run(run: Any, main: Sequence[int], moment: datetime, lease: timede
             "heat": letters,
         }
     )
+
+
+def evidence_of(session: Session, study: Study, public_id: str) -> RunEvidence:
+    """The verdict on a run, and why it is not `likely`."""
+    run = find_run(session, study, public_id)
+    judged = judge_run(session, run)
+    reasons = reasons_against(judged, refused=has_refusals(session, run))
+    return RunEvidence(verdict=judged.verdict, points=judged.points, reasons=reasons)
 
 
 def stage_reached(run: Any) -> str:

@@ -461,6 +461,14 @@ class TimelineCalibration(BaseModel):
     recheck_percent: float | None
 
 
+class RunEvidence(BaseModel):
+    """Whether a run's answers are likely a person's, by what is stored now."""
+
+    verdict: Verdict
+    points: float
+    reasons: list[str] = Field(description="What speaks against a person, in sentences.")
+
+
 class Timeline(BaseModel):
     """One run, complete."""
 

@@ -490,6 +490,11 @@ export interface paths {
   };
   get: operations["get_identity"];
  };
+ "/api/admin/studies/{study}/runs/{run}/evidence": {
+  parameters: {
+  };
+  get: operations["get_evidence"];
+ };
  "/api/admin/studies/{study}/runs/{run}/exclusion": {
   parameters: {
   };
@@ -2913,6 +2918,12 @@ export interface components {
    visits: number;
    next_at: string | null;
   };
+  RunEvidence: {
+   /** @enum {string} */
+   verdict: "likely" | "unclear" | "unlikely" | "not_judged";
+   points: number;
+   reasons: string[];
+  };
   RunIdentity: {
    run: string;
    participant: string;
@@ -4163,6 +4174,7 @@ export type ResultTable = components['schemas']['ResultTable'];
 export type Results = components['schemas']['Results'];
 export type Retention = components['schemas']['Retention'];
 export type RetentionPreview = components['schemas']['RetentionPreview'];
+export type RunEvidence = components['schemas']['RunEvidence'];
 export type RunIdentity = components['schemas']['RunIdentity'];
 export type RunPage = components['schemas']['RunPage'];
 export type RunStart = components['schemas']['RunStart'];
@@ -8009,6 +8021,40 @@ export interface operations {
     };
     content: {
      "application/json": components["schemas"]["RunIdentity"];
+    };
+   };
+   422: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+   "4XX": {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["ErrorBody"];
+    };
+   };
+  };
+ };
+ get_evidence: {
+  parameters: {
+   path: {
+    study: string;
+    run: string;
+   };
+  };
+  responses: {
+   200: {
+    headers: {
+     [name: string]: unknown;
+    };
+    content: {
+     "application/json": components["schemas"]["RunEvidence"];
     };
    };
    422: {

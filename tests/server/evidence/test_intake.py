@@ -14,6 +14,7 @@ from server.models import AnswerEvidence, RunEvent, StudyRun
 from server.participation.evidence_repository import has_refusals
 from server.participation.intake import FALSE_ANSWERS_PER_MINUTE
 from server.participation.judgement import judge_run
+from tests.helpers.admins import signed_in
 from tests.helpers.evidence import Watcher
 from tests.helpers.studies import StudyInDatabase
 from tests.server.evidence.conftest import CLIP_S
@@ -81,6 +82,10 @@ def test_ten_thousand_false_answers_are_noted_once_and_hinder_nobody(
         assert [event.data for event in noted] == [{"code": "ticket_missing"}]
         run = session.scalars(select(StudyRun).where(StudyRun.public_id == bot.run_id)).one()
         assert judge_run(session, run).verdict == "unlikely"
+    found = signed_in(client, services, "owner").get(f"/studies/short/runs/{bot.run_id}/evidence").json()
+    assert found["verdict"] == "unlikely"
+    assert found["reasons"][0] == "Answers were refused, because their evidence was wrong."
+    assert "do not show that a person answered" in found["reasons"][-1]
 
 
 def test_clips_cannot_outlast_the_time_since_their_tickets(watcher: Watcher) -> None:

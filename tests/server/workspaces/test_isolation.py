@@ -97,6 +97,7 @@ NEEDED: dict[Right, set[str]] = {
     "export": {
         "GET runs",
         "GET runs/{run}",
+        "GET runs/{run}/evidence",
         "GET runs/{run}/replay",
         "GET runs/{run}/replay/trials/{trial_index}",
         "GET data/ratings.csv",

@@ -1,5 +1,5 @@
 import { Card, Group, Progress, Stack, Text, Title, SegmentedControl, Alert, Center, Loader, SimpleGrid } from "@mantine/core";
-import { type Schemas, sessionQuery } from "../api";
+import { type Schemas, sessionQuery, studyQuery } from "../api";
 import { words, ago, ORIGINS, soon } from "../ui/format";
 import { useEffect, useRef, memo, type MouseEvent, useState, startTransition } from "react";
 import { useNavigate, useParams } from "@tanstack/react-router";
@@ -213,7 +213,17 @@ const Row = memo(function Row({ study, run, seen }: { study: string; run: Run; s
       </td>
       <td className="only-wide">{words(run.stage)}</td>
       <td className="only-wide one-line">{seen}</td>
-      <td className="only-wide one-line">{run.evidence_verdict ? words(run.evidence_verdict) : ""}</td>
+      <td className="only-wide one-line">
+        {run.evidence_verdict === "unlikely" || run.evidence_verdict === "unclear" ? (
+          <a href={`/admin/studies/${study}/participants/${run.run}`} data-run={run.run} aria-label={`${run.evidence_verdict}: why`}>
+            {run.evidence_verdict}
+          </a>
+        ) : run.evidence_verdict ? (
+          words(run.evidence_verdict)
+        ) : (
+          ""
+        )}
+      </td>
       <td className="number only-wide one-line">
         {run.main_answered} of {run.main_trials}
       </td>
@@ -290,6 +300,15 @@ export function merge(before: Snapshot | null, fresh: Snapshot): Snapshot {
   return { ...fresh, runs: [...runs.values()] };
 }
 
+/** Once more runs are complete, what the study's header says of them is loaded again. */
+function useFreshHeader(study: string, snapshot: Snapshot | null): void {
+  const queries = useQueryClient();
+  const complete = snapshot?.complete;
+  useEffect(() => {
+    if (complete !== undefined) void queries.invalidateQueries({ queryKey: studyQuery(study).queryKey, exact: true });
+  }, [queries, study, complete]);
+}
+
 const FailingClips = onDemand(async () => (await import("./FailingClips")).FailingClips);
 type Origin = Schemas["MonitorSnapshot"]["origin"];
 
@@ -305,6 +324,7 @@ export function MonitorTab() {
   const { study = "" } = useParams({ strict: false });
   const [chosen, setOrigin] = useState<Origin | null>(null);
   const { snapshot, connected } = useMonitor(study, chosen);
+  useFreshHeader(study, snapshot);
   const interrupted = connected ? null : (
     <Alert color="yellow" role="status">
       Connection lost; reconnecting.

@@ -267,6 +267,24 @@ function calibrationFacts(one: Schemas["TimelineCalibration"]): Record<string, s
   return Object.fromEntries(Object.entries(facts).filter((fact): fact is [string, string | number] => fact[1] !== null));
 }
 
+/** Whether the answers are likely a person's, and what speaks against it. */
+function Evidence({ study, run }: { study: string; run: string }) {
+  const { data } = useQuery({
+    queryKey: ["timeline", study, run, "evidence"],
+    queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/runs/{run}/evidence", { params: { path: { study, run } } })),
+  });
+  if (data === undefined || data.verdict === "not_judged") return null;
+  return (
+    <Text size="sm" role="group" aria-label="A person">
+      A person: <b>{data.verdict}</b> ({data.points} {data.points === 1 ? "point" : "points"}).{" "}
+      {data.reasons.length > 0 && `${data.reasons.join(" ")} `}
+      <Anchor href="/docs/explanation/evidence.html" target="_blank" rel="noopener">
+        How this is judged
+      </Anchor>
+    </Text>
+  );
+}
+
 export function TimelinePage() {
   const { study = "", run = "" } = useParams({ strict: false });
   const mayChange = useMay(study, "run");
@@ -305,6 +323,7 @@ export function TimelinePage() {
                     Run <CopyId value={data.summary.run} what="run id" />
                   </Text>
                 )}
+                <Evidence study={study} run={run} />
                 {data.summary.excluded && <Text c="var(--mantine-color-error)">Excluded: {data.summary.exclusion_reason}</Text>}
               </div>
               <Group>
