@@ -24,6 +24,15 @@ def _table(path: Path) -> np.ndarray:
     return scores
 
 
+HAS_ROOM = """(select) => {
+    const style = getComputedStyle(select);
+    const drawing = document.createElement("canvas").getContext("2d");
+    drawing.font = style.font;
+    const longest = Math.max(...[...select.options].map(({ text }) => drawing.measureText(text).width));
+    return select.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight) >= longest;
+}"""
+
+
 def test_a_table_becomes_a_result(dashboard: Dashboard, tmp_path: Path) -> None:
     scores = _table(tmp_path / "warmth.csv")
     page = dashboard.open("/analyze")
@@ -31,6 +40,9 @@ def test_a_table_becomes_a_result(dashboard: Dashboard, tmp_path: Path) -> None:
     # `warmth` does not name a rating: the page asks for one
     expect(page.get_by_text("Choose a column for: Rating.")).to_be_visible()
     page.get_by_label("Role of warmth").select_option(label="Rating")
+    for width in (390, 1280):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.get_by_label("Role of warmth").evaluate(HAS_ROOM)  # no role is cut off
     expect(page.get_by_label("Role of face")).to_have_value("within")
     page.get_by_label("Role of seat").select_option(label="None")
     page.get_by_role("button", name="Analyze", exact=True).click()

@@ -158,6 +158,8 @@ def test_clips_that_two_people_move_stay_where_each_put_them(dashboard: Dashboar
     expect(spot(first, "fast, no. 2: slow_2.mp4")).to_be_visible()
     assert theirs["fast 2"] == "slow_2.mp4"
     assert axe_violations(first) == []
+    first.reload()  # before anybody has chosen: both sides are still there
+    expect(first.get_by_text("You both moved clips: slow_2.mp4")).to_be_visible()
     first.get_by_role("group", name="Clips that you both moved").get_by_text("Yours", exact=True).click()
     expect(spot(first, "fast, no. 1: slow_2.mp4")).to_be_visible()
     _, places = saved(first, dashboard, "met", 5)

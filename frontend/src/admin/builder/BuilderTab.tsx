@@ -139,7 +139,12 @@ function Begun({ detail }: { detail: Schemas["StudyDetail"] }) {
           <Workbench
             detail={detail}
             meeting={begun.meeting}
-            start={{ toml: begun.toml, data: isTable(begun.data) ? begun.data : {}, places: begun.places }}
+            start={{
+              toml: begun.toml,
+              data: isTable(begun.data) ? begun.data : {},
+              places: begun.places,
+              isUndecided: (begun.meeting?.clips?.both.length ?? 0) > 0,
+            }}
           />
         </Stack>
       )}

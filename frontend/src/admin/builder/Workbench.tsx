@@ -12,13 +12,13 @@ import { DesignLine, TomlText } from "../studies/Design";
 import { TurnedAway } from "../studies/StatusBadge";
 import { onDemand } from "../ui/Answer";
 import { useChange } from "../ui/useChange";
-import { type Data, isTable, placeOf, type Section } from "./data";
+import { isTable, placeOf, type Section } from "./data";
 import { Field } from "./fields/Field";
 import { Forms, Texts } from "./Forms";
 import { type Meeting, type MeetingEdit, placeName, withChange } from "./history";
 import { forgetUpload } from "../clips/useUpload";
 import { forgetWork } from "./kept";
-import { type ClipMeeting, type Place, placesToSave } from "./places";
+import { type ClipMeeting, placesToSave } from "./places";
 import { EXPERIMENT, sectionOf, SECTIONS } from "./schema";
 import { TrialPreview } from "./TrialPreview";
 import { type Builder, BuilderContext, useBuilder, useBuilderHere } from "./useBuilder";
@@ -115,7 +115,7 @@ function effect(edit: Schemas["JudgedEdit"], detail: Schemas["StudyDetail"]): st
 
 interface Props {
   detail: Schemas["StudyDetail"];
-  start: { toml: string; data: Data; places: readonly Place[] | null };
+  start: Parameters<typeof useBuilder>[1];
   meeting: Meeting | null;
 }
 
@@ -302,7 +302,7 @@ function BeginSeries({ edit, detail, onClose, onConfirm }: BeginSeriesProps) {
         {edit.changes
           .filter(({ effect }) => effect === "measured")
           .map(({ path, text }) => (
-            <List.Item key={path}>{text}</List.Item>
+            <List.Item key={path}>{inWords({ path, text, effect: "measured" })}</List.Item>
           ))}
       </List>
       <Group justify="flex-end" mt="md">

@@ -59,6 +59,8 @@ interface Start {
   data: Data;
   toml: string;
   places: readonly Place[] | null;
+  /** Whether somebody still has to choose between two places of clips: the work they began from is kept until then. */
+  isUndecided: boolean;
 }
 
 export function useBuilder({ summary, toml: stored, definition, rendered }: Schemas["StudyDetail"], start: Start): Builder {
@@ -110,10 +112,12 @@ export function useBuilder({ summary, toml: stored, definition, rendered }: Sche
     const own = history.now.places;
     return own === null || (inCells !== null && isAsStored(own, inCells, data)) ? null : own;
   }, [history.now.places, inCells, data]);
+  const isWaiting = start.isUndecided && text === null && history.past.length === 0;
   useEffect(() => {
+    if (isWaiting) return;
     if (present === stored && moves === null) forgetWork(study);
     else keepWork(study, { toml: present ?? base, data: present === null ? data : null, revision, base: stored, places: moves });
-  }, [present, base, data, stored, study, revision, moves]);
+  }, [present, base, data, stored, study, revision, moves, isWaiting]);
   const places = useMemo(() => placesNow(moves, inCells), [moves, inCells]);
   const empty = useMemo(() => {
     const filled = places === null ? [] : arrangementOf(places, data).filled;

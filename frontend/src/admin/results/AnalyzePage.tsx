@@ -191,6 +191,7 @@ function ColumnRoles({ columns, missing, command, setCommand, roles, setRoles }:
                 <Table.Td>
                   <NativeSelect
                     size="xs"
+                    miw="max-content"
                     aria-label={`Role of ${column.name}`}
                     value={possible.includes(roles[column.name] ?? "") ? roles[column.name] : ""}
                     onChange={(event) => setRoles({ ...roles, [column.name]: event.currentTarget.value })}
