@@ -15,7 +15,7 @@ from experiments.load import parse_experiment
 from experiments.manifest import Clip, Manifest
 from server.app import create_app
 from server.cli_common import migrated_services
-from server.models import AuditEntry, Study
+from server.models import AuditEntry, Study, StudyRun
 from server.studies.creation import add_version, create_study, store_clips
 from tests.browser.admin.conftest import Dashboard
 from tests.browser.visit import axe_violations
@@ -254,6 +254,31 @@ def test_every_page_of_a_study_says_its_step_and_what_comes_next(
     steps = page.get_by_role("list", name="Steps of the study")
     expect(steps.locator("[aria-current=step]")).to_have_text("Live")
     expect(page.get_by_role("link", name="Watch the participants: 3 complete.")).to_be_visible()
+
+
+def test_the_monitor_renews_the_header_and_says_why_a_run_is_unlikely_a_persons(
+    dashboard: Dashboard, tmp_path: Path
+) -> None:
+    settings = dashboard.server.settings
+    with migrated_services(settings) as services:
+        study = add_study(services, tmp_path, SHORT, name="watched")
+    page = dashboard.open("/studies/watched/monitor")
+    expect(page.get_by_role("link", name="Watch the participants: 0 complete.")).to_be_visible()
+    with TestClient(create_app(settings)) as client:
+        person = Participant(client, study.link_token).agree()
+        person.answer_all()
+        assert person.request("POST", "/complete").status_code == 200
+    expect(page.get_by_role("link", name="Watch the participants: 1 complete.")).to_be_visible()
+    with migrated_services(settings) as services, services.database.write() as session:
+        watched = session.query(Study).filter_by(name="watched").one()
+        run = session.query(StudyRun).filter_by(study_id=watched.id)
+        run.update({"evidence": "asked", "evidence_verdict": "unlikely"})
+    page.reload()
+    page.get_by_role("link", name="unlikely: why").click()
+    verdict = page.get_by_role("group", name="A person")
+    expect(verdict).to_contain_text("Answers came without valid tickets.")
+    assert axe_violations(page) == []
+    picture(page, "verdict")
 
 
 def test_a_study_that_is_full_says_so_on_its_page_without_moving_it(

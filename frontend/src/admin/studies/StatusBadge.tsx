@@ -3,7 +3,7 @@
 import { Badge, Group, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { launchChecksQuery, type Schemas } from "../api";
+import { launchChecksQuery, type Schemas, studyQuery } from "../api";
 import { counted } from "../ui/format";
 
 const COLOURS = { draft: "gray.7", pilot: "indigo.8", live: "teal.9", closed: "dark.4" };
@@ -70,7 +70,11 @@ export function nextStep(
   return { text: "Open the study as a pilot, or set it live.", page: null };
 }
 
+const FRESH_MS = 20_000;
+
 export function StudySteps({ summary }: { summary: Schemas["StudySummary"] }) {
+  // Runs end while somebody looks at the page.
+  useQuery({ ...studyQuery(summary.name), refetchInterval: summary.status === "live" || summary.status === "pilot" ? FRESH_MS : false });
   const checks = useQuery(launchChecksQuery(summary.name)).data;
   const tried = checks !== undefined && !checks.some(({ kind }) => kind === "not_tried");
   const now = summary.status === "draft" ? (tried ? 1 : 0) : summary.status === "pilot" ? 2 : 3;
