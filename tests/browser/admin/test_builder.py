@@ -116,7 +116,7 @@ def test_an_edit_that_changes_what_is_measured_is_said_before_it_is_saved(dashbo
     page = opened(dashboard, "trial")
     page.get_by_label("Maximum", exact=True).first.fill("5")
     expect(page.get_by_text("Saving starts a new data series")).to_be_visible()
-    expect(page.get_by_text("trial.scale.maximum: 7 becomes 5")).to_be_visible()
+    expect(page.get_by_text("“Maximum” of “Scale” of “Trial”: 7 becomes 5")).to_be_visible()
     page.get_by_role("button", name="Discard changes").click()
     expect(page.get_by_text("Saving starts a new data series")).to_be_hidden()
 

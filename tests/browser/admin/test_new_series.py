@@ -19,7 +19,7 @@ def test_a_new_series_is_confirmed_and_says_where_the_answers_are(dashboard: Das
     expect(button).to_be_enabled()
     button.click()
     dialog = page.get_by_role("dialog")
-    expect(dialog).to_contain_text("4 participants answered on 1-7. A new data series begins")
+    expect(dialog).to_contain_text("4 participants answered on 1-7. This version starts a new data series")
     expect(dialog).to_contain_text("stay separate, in series 1 (version 1)")
     picture(page, "confirm-series")
     dialog.get_by_role("button", name="Cancel").click()

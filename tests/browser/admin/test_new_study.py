@@ -166,7 +166,7 @@ def test_names_that_say_nothing_lead_into_the_grid(dashboard: Dashboard, clips: 
     hand.fill(page.get_by_label("Short name"), "unnamed")
     hand.bring(clips)
     page.get_by_text("12 clips received").wait_for()
-    expect(page.get_by_role("radio", name="Put clips into a grid")).to_be_checked()
+    expect(page.get_by_role("radio", name="In a grid")).to_be_checked()
     expect(page.get_by_text("Still needed: what varies between the clips with its levels")).to_be_visible()
     robot, speed = (page.get_by_role("group", name=f"Factor {number}") for number in (1, 2))
     hand.fill(robot.get_by_role("textbox").first, "robot type")

@@ -92,9 +92,9 @@ export function Levels({ name, template, upload, isLooked, notPlayed, refused, i
           value={by}
           onChange={setBy}
           data={[
-            { value: "pattern", label: "Read it from the file names" },
-            { value: "grid", label: "Put clips into a grid" },
-            { value: "csv", label: "From a table" },
+            { value: "pattern", label: "By file names" },
+            { value: "grid", label: "In a grid" },
+            { value: "csv", label: "By a table" },
           ]}
         />
       </Input.Wrapper>
