@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 BIN = ROOT / ".venv" / ("Scripts" if os.name == "nt" else "bin")
-DATA = Path(os.environ.get("PALPEBRA_DATA_FOLDER", ROOT / "data"))
+DATA = Path(os.environ.get("PALPEBRA_DATA_FOLDER") or ROOT / "data")
 STUDIES = ("exp3", "exp1", "exp2")
 
 

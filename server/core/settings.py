@@ -226,8 +226,13 @@ class Settings(BaseSettings):
     Times are in minutes, hours or seconds, as the name indicates; sizes are in bytes.
     """
 
+    # An empty variable is one that compose or a shell passes on without a value.
     model_config = SettingsConfigDict(
-        env_prefix="PALPEBRA_", env_nested_delimiter="__", validate_by_name=True, extra="ignore"
+        env_prefix="PALPEBRA_",
+        env_nested_delimiter="__",
+        env_ignore_empty=True,
+        validate_by_name=True,
+        extra="ignore",
     )
 
     data_folder: Path = Field(

@@ -33,6 +33,14 @@ def test_without_a_database_url_sqlite_lies_in_the_data_folder(
     assert Settings(data_folder=tmp_path).resolved_database_url == f"sqlite:///{tmp_path}/palpebra.sqlite"
 
 
+def test_an_empty_variable_is_one_that_was_not_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DATA_FOLDER", "SHARED_FOLDER", "SMTP_PASSWORD_FILE", "SESSION_IDLE"):
+        monkeypatch.setenv(f"PALPEBRA_{name}", "")
+    set_empty = Settings()
+    monkeypatch.undo()
+    assert set_empty == Settings()
+
+
 def test_every_setting_is_described() -> None:
     described = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "settings.md").read_text(
         encoding="utf-8"
