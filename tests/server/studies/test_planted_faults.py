@@ -245,7 +245,7 @@ FAULTS: dict[str, Fault] = {
         plant=lambda ground: declare_frames(ground.services, ground.first_clip()),
         blocks=True,
     ),
-    "a clip that is no video": Fault(
+    "a clip that is not a video": Fault(
         "clip_undecodable",
         "cannot be read as a video",
         plant=lambda ground: declare_other_bytes(ground.services, ground.first_clip()),

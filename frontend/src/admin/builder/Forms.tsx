@@ -141,8 +141,8 @@ function ConsentMenu({ language }: { language: string }) {
     <Group>
       <Menu position="bottom-start">
         <Menu.Target>
-          <Button size="xs" variant="light">
-            Use a consent template ▾
+          <Button size="xs" variant="light" rightSection="▾">
+            Use a consent template
           </Button>
         </Menu.Target>
         <Menu.Dropdown>

@@ -1,4 +1,4 @@
-/** What varies between somebody's own clips, and what is asked about them: the second half of New study, loaded with the first clips. */
+/** What varies between your own clips, and the question about them: the second half of New study, loaded with the first clips. */
 
 import { Alert, Button, Input, SegmentedControl, SimpleGrid, Stack, Table, Text, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
