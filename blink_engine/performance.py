@@ -232,7 +232,7 @@ def perform(
     if not 0.0 < duration_s < 1e7:
         raise ValueError(f"expected a duration above 0 s and below 10,000,000 s, got {duration_s}")
     chosen = parameters or default_parameters()
-    open_spans = _join_holds(holds)
+    open_spans = join_holds(holds)
     blinks = plan_blinks(duration_s, BlinkPlan(chosen, state, seed), events, changes, open_spans)
     # The hold that follows each onset; one at infinity follows the last.
     starts = np.array([*(one.start_s for one in open_spans), math.inf])
@@ -282,7 +282,7 @@ def plan_blinks(
     return [*blinks, *plan.due(duration_s)]
 
 
-def _join_holds(holds: Iterable[Hold]) -> list[Hold]:
+def join_holds(holds: Iterable[Hold]) -> list[Hold]:
     """Holds in order; those that touch or overlap are one."""
     joined: list[Hold] = []
     for one in sorted(holds, key=lambda hold: hold.start_s):

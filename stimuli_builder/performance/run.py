@@ -15,7 +15,7 @@ from webvtt.models import Caption
 from blink_engine import Event, Hold, Performance, StateName, default_parameters, perform
 from blink_engine.laws import Law
 from blink_engine.parameters import Parameters
-from blink_engine.performance import GAZE_CLOSURE_MAX
+from blink_engine.performance import GAZE_CLOSURE_MAX, join_holds
 from blink_engine.speech import Speech, join_speech, seed_of_speaker, speech_events, speech_states
 from experiments.errors import InputError, counted, did_you_mean
 from experiments.files import check_targets, whole_text
@@ -287,7 +287,7 @@ def _onsets(path: Path, duration_s: float) -> list[float]:
 
 # While a flag is up, blinks are held back.
 
-FLAGS = {"0": False, "down": False, "false": False, "1": True, "up": True, "true": True}
+FLAGS = dict.fromkeys(("0", "0.0", "down", "false"), False) | dict.fromkeys(("1", "1.0", "up", "true"), True)
 
 
 def read_flag(path: Path, duration_s: float) -> list[Hold]:
@@ -311,8 +311,10 @@ def read_flag(path: Path, duration_s: float) -> list[Hold]:
         times = np.array([[float(row[name]) for name in names] for row in rows])
     except ValueError as error:
         raise InputError(f"{path}: expected seconds: {error}") from error
-    # NaN is in no range. A track of flags may go on after the end.
-    if not len(times) or not ((times[:, 0] >= 0) & (times[:, 0] <= duration_s)).any():
+    if not rows:
+        raise InputError(f"{path}: expected one row or more under the header, got none")
+    # NaN is in no range. A track of flags may go on after the end, and a span may begin before the start.
+    if not ((times[:, -1] >= 0) & (times[:, 0] <= duration_s)).any():
         raise InputError(f"{path}: expected times from 0 to {duration_s:g} s; correct them or --duration")
     if spans:
         if not (np.isfinite(times).all() and (times[:, 0] < times[:, 1]).all()):
@@ -328,11 +330,11 @@ def read_flag(path: Path, duration_s: float) -> list[Hold]:
         up = np.array([FLAGS[text] for text in texts])
         # The last value holds until the end.
         starts, ends = times[up, 0], np.append(times[1:, 0], max(duration_s, times[-1, 0] + 1))[up]
-    return [
+    return join_holds(
         Hold(max(0.0, float(start)), min(duration_s, float(end)))
         for start, end in zip(starts, ends, strict=True)
         if start < duration_s and end > 0
-    ]
+    )
 
 
 # Where the eyes look: lids follow the gaze, and blinks come with large shifts of it.

@@ -296,6 +296,7 @@ def test_lids_follow_a_gaze_whose_large_shifts_bring_blinks(tmp_path: Path) -> N
     "text",
     [
         "time_s,flag\n0,0\n5,1\n12.5,0\n15,down\n18,Up\n",
+        "time_s,flag\n0,0.0\n5,1.0\n12.5,0.0\n18,1.0\n",
         "start_s,end_s\n18,40\n5,9\n8,12.5\n",
     ],
 )
@@ -314,6 +315,14 @@ def test_blinks_come_while_the_flag_is_down(tmp_path: Path, text: str) -> None:
         assert held[1251:1300].max() > 0.3
 
 
+def test_spans_of_a_flag_that_overlap_are_counted_once(tmp_path: Path) -> None:
+    (tmp_path / "flag.csv").write_text("start_s,end_s\n5,9\n-1,6\n5,9\n", encoding="utf-8")
+    arguments = ["performance", "--blink-while-down", str(tmp_path / "flag.csv"), "--duration", "20"]
+    done = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "out.csv")])
+    assert done.exit_code == 0, done.output
+    assert "the flag is up for 9.0 s" in done.output
+
+
 @pytest.mark.parametrize(
     ("text", "options", "said"),
     [
@@ -328,6 +337,7 @@ def test_blinks_come_while_the_flag_is_down(tmp_path: Path, text: str) -> None:
         ("time_s,flag\n1,1\nnan,0\n", [], "expected rising times"),
         ("start_s,end_s\n3,2\n", [], "expected each end_s after its start_s"),
         ("start_s,end_s\n30,40\n", [], "expected times from 0 to 10 s"),
+        ("start_s,end_s\n", [], "expected one row or more under the header"),
         ("time_s,flag\n1,1\n", ["--blinks-at", "given.csv"], "remove --blink-while-down"),
     ],
 )
