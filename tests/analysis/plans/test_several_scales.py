@@ -3,6 +3,7 @@
 import csv
 import json
 import random
+import re
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,10 @@ def test_each_scale_has_its_companions_models_and_multiverse(tmp_path, rows) -> 
     for scale in SCALES:
         assert f"tab:{scale.name}-robust" in made
         assert f"fig:{scale.name}-figure-multiverse" in made
+    page = (out / "report.html").read_text(encoding="utf-8")
+    ids = re.findall(r' id="([^"]+)"', page)
+    assert len(set(ids)) == len(ids)
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= set(ids)
 
 
 def test_the_multiverse_of_a_scale_is_that_of_the_scale_alone(tmp_path, rows) -> None:
