@@ -32,11 +32,13 @@ def damaged_files() -> list[str]:
         return []
     damaged = []
     # Not `metadata.files`, which leaves out missing files.
-    for name, _, size in csv.reader((installed.read_text("RECORD") or "").splitlines()):
+    for row in filter(None, csv.reader((installed.read_text("RECORD") or "").splitlines())):
+        # A record that was cut off ends in a row without a size.
+        name, size = row[0], row[2] if len(row) == 3 else "cut off"
         # Commands lie outside, and each installer writes its own. Compiled files and the record have no size.
         if size and not name.startswith(".."):
             path = Path(str(installed.locate_file(name)))
-            if not path.is_file() or path.stat().st_size != int(size):
+            if not path.is_file() or str(path.stat().st_size) != size:
                 damaged.append(name)
     return damaged
 

@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import urllib.request
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from experiments.errors import InputError
 from palpebra import cli
 from palpebra.cli import with_start
 from palpebra.folders import data_folder, free_port
-from palpebra.intact import refuse_broken_installation
+from palpebra.intact import damaged_files, refuse_broken_installation
 from palpebra.start import only_server_of
 from server.core.settings import Settings
 from tests.helpers.ports import free_port as unused_port
@@ -91,6 +92,16 @@ def test_package_of_another_project_is_named(tmp_path: Path, monkeypatch: pytest
     expected = r"package 'migrations': expected Palpebra's, got the one in .*: uv tool install FILE\.whl$"
     with pytest.raises(InputError, match=expected):
         refuse_broken_installation()
+
+
+def test_a_damaged_record_is_no_traceback(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "palpebra-1.dist-info"
+    folder.mkdir()
+    (tmp_path / "whole.py").write_text("x", encoding="utf-8")
+    record = "whole.py,sha256=a,1\n\nshort.py,sha256=a,5\npalpebra-1.dist-info/RECORD,,\ncut.py,sha2"
+    (folder / "RECORD").write_text(record, encoding="utf-8")
+    monkeypatch.setattr(metadata, "distribution", lambda _: metadata.Distribution.at(folder))
+    assert damaged_files() == ["short.py", "cut.py"]
 
 
 def test_upgrade_backs_up_first_and_names_both(tmp_path: Path) -> None:
