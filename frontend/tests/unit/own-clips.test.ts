@@ -80,6 +80,27 @@ describe("the grid of a new study", () => {
     );
   });
 
+  it("needs a name and levels of each factor that is begun, and none that the table has for itself", () => {
+    const filled = (...factors: [string, string][]) => gridProblem({ ...typed(...factors), places: filledInOrder(typed(...factors)) });
+    expect(filled(["speed", "slow, fast"], ["", ""])).toBe(false);
+    expect(filled(["speed", "slow, fast"], ["", "tin, rosie"])).toBe("a name for tin, rosie");
+    expect(filled(["speed", "slow, fast"], ["robot", " , "])).toBe("levels of robot");
+    expect(filled(["exemplar", "slow, fast"])).toContain("other than ‘exemplar’");
+    expect(filled(["file", "slow, fast"])).toContain("other than ‘file’");
+    expect(filled(["speed", "slow, f/st"])).toBe("a level without a slash in the place of f/st");
+  });
+
+  it("takes names that every object has", () => {
+    const cells = typed(["constructor", "tin, rosie"], ["__proto__", "toString, valueOf"]);
+    expect(tableOfCells({ ...cells, places: filledInOrder(cells) }).split("\n")[1]).toBe('"IMG_1.mov","tin","toString","1"');
+    expect(withNames("{constructor}_{toString}.mp4", {})).toBe("{constructor}_{toString}.mp4");
+    const read = filledByPattern([...clips, { ...clips[0], file: "a_b.mp4" } as Place], {}, "{constructor}_{valueOf}.mp4");
+    expect(factorsOf(read.data)).toEqual([
+      { name: "constructor", levels: ["a", "IMG"] },
+      { name: "valueOf", levels: ["b", "1", "2", "3", "10"] },
+    ]);
+  });
+
   it("begins with what a pattern reads", () => {
     const places = FILES.map((file): Place => ({ clip_sha256: file, file, levels: {}, exemplar: 0, upload: "u" }));
     const cells = cellsByPattern(places, "{robot}_{speed}_{exemplar}.mp4");

@@ -30,8 +30,10 @@ interface Factor {
 }
 
 export const isClip = (one: Place, other: Place) => one.clip_sha256 === other.clip_sha256 && one.file === other.file;
+/** The level of a factor; "" where none is known. Every object has `constructor` and others, which a factor may be called. */
+const levelOf = (levels: Readonly<Record<string, string>>, factor: string) => (Object.hasOwn(levels, factor) ? (levels[factor] ?? "") : "");
 const addressOf = (levels: Readonly<Record<string, string>>, exemplar: number, factors: readonly Factor[]) =>
-  JSON.stringify([...factors.map(({ name }) => levels[name] ?? ""), exemplar]);
+  JSON.stringify([...factors.map(({ name }) => levelOf(levels, name)), exemplar]);
 
 export function storedPlaces(clips: readonly Schemas["ClipOut"][]): Place[] {
   return clips.map(({ clip_sha256, file, levels, exemplar }) => ({
@@ -304,7 +306,7 @@ export function filledByPattern(places: readonly Place[], data: Data, pattern: s
     const declared = known[knownNames.indexOf(name)];
     const levels = listAt(declared, ["levels"]);
     const names = new Set(levels.map((level) => textAt(level, ["name"])));
-    const fresh = [...new Set(next.flatMap((member) => member.levels[name] ?? []))].filter((level) => !names.has(level));
+    const fresh = [...new Set(next.map((member) => levelOf(member.levels, name)))].filter((level) => level !== "" && !names.has(level));
     return {
       ...(isTable(declared) ? declared : { name, label: `${name.charAt(0).toUpperCase()}${name.slice(1).replaceAll("_", " ")}` }),
       levels: [...levels, ...fresh.map((level) => ({ name: level, label: level }))],
@@ -372,17 +374,26 @@ export function gridProblem(cells: NewCells): string | false {
   const data = designOfTyped(cells);
   const names = factorsOf(data).map(({ name }) => name);
   if (names.length === 0) return "what varies between the clips with its levels";
+  for (const { name, levels } of cells.factors) {
+    const known = levelsOfText(levels);
+    if (factorName(name) === "" && known.length > 0) return `a name for ${known.join(", ")}`;
+    if (factorName(name) !== "" && known.length === 0) return `levels of ${name}`;
+    const slashed = known.find((level) => level.includes("/"));
+    if (slashed !== undefined) return `a level without a slash in the place of ${slashed}`;
+  }
   if (new Set(names).size < names.length) return "another name for each factor";
   const { filled, rest } = arrangementOf(cells.places, data);
   const empty = filled.filter(({ clip }) => clip === null).length;
   if (rest.length > 0 && empty > 0) return "a cell for each clip";
   if (empty > 0) return "a clip for each place of the grid, or other levels";
-  return reservedProblem(names);
+  return reservedProblem(names, TABLE_COLUMNS);
 }
 
 /** The levels of each factor that has a name. */
 export const levelsOfCells = (cells: NewCells) => factorsOf(designOfTyped(cells)).map(({ levels }) => levels);
 
+/** Columns of the table that are no factors. */
+const TABLE_COLUMNS = ["file", "exemplar"];
 const quoted = (text: string) => `"${text.replaceAll('"', '""')}"`;
 
 /** The table of levels: one row for each clip in a cell. */

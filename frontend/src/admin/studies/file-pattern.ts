@@ -33,8 +33,8 @@ export function levelsByPattern(pattern: string, files: readonly string[]): File
 const RESERVED: ReadonlySet<string> = new Set(reservedNames.filter((name) => name !== EXEMPLAR));
 
 /** What to do about a factor that has the name of another column of the answers; false where none has. */
-export function reservedProblem(factors: readonly string[]): string | false {
-  const name = factors.find((one) => RESERVED.has(one));
+export function reservedProblem(factors: readonly string[], others: readonly string[] = []): string | false {
+  const name = factors.find((one) => RESERVED.has(one) || others.includes(one));
   return name !== undefined && `a factor name other than ‘${name}’ (a column of the answers), such as ${name}_shown`;
 }
 
@@ -116,7 +116,7 @@ export function unnamedFactors(pattern: string, files: readonly string[]): Unnam
 export function withNames(pattern: string, names: Readonly<Record<string, string>>): string {
   const given = new Map<string, string>();
   for (const field of fieldsOf(pattern)) {
-    const name = factorName(names[field] ?? "");
+    const name = Object.hasOwn(names, field) ? factorName(names[field] ?? "") : "";
     const taken = [...fieldsOf(pattern), ...given.values(), EXEMPLAR];
     if (name !== "" && !taken.includes(name)) given.set(field, name);
   }
