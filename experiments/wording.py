@@ -274,16 +274,35 @@ def untranslated(declared: Experiment) -> dict[str, list[str]]:
 # What a consent text promises: whom to contact, how long it takes, what is paid.
 
 _CONTACT = re.compile(r"[^\s@<>]+@[^\s@<>]+\.\w{2,}|https?://\S+|\+?\d[\d ()/-]{6,}\d")
-_NUMBERS = {
-    "en": "one two three four five six seven eight nine ten eleven twelve",
-    "de": "eine zwei drei vier fünf sechs sieben acht neun zehn elf zwölf",
+_UNITS = {
+    "en": "one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen "
+    "seventeen eighteen nineteen",
+    "de": "ein zwei drei vier fünf sechs sieben acht neun zehn elf zwölf dreizehn vierzehn fünfzehn sechzehn "
+    "siebzehn achtzehn neunzehn",
 }
-_SPELLED = {word: number for words in _NUMBERS.values() for number, word in enumerate(words.split(), 1)} | {
-    "fifteen": 15, "twenty": 20, "thirty": 30, "forty": 40,
-    "fünfzehn": 15, "zwanzig": 20, "dreißig": 30, "vierzig": 40,
-}  # fmt: skip
-"""Numbers that a text may spell out."""
-_NUMBER = rf"(\d+|\b(?:{'|'.join(_SPELLED)})\b)"
+_TENS = {
+    "en": ("twenty thirty forty fifty sixty seventy eighty ninety", "{tens}-{unit}"),
+    "de": ("zwanzig dreißig vierzig fünfzig sechzig siebzig achtzig neunzig", "{unit}und{tens}"),
+}
+
+
+def _spelled_numbers() -> dict[str, int]:
+    """Numbers below 100 that a text may spell out."""
+    numbers = {"eine": 1}
+    for language, (every_ten, both) in _TENS.items():
+        units = _UNITS[language].split()
+        numbers |= {word: number for number, word in enumerate(units, 1)}
+        for ten, tens in enumerate(every_ten.split(), 2):
+            numbers[tens] = 10 * ten
+            for unit, word in enumerate(units[:9], 1):
+                numbers[both.format(tens=tens, unit=word)] = 10 * ten + unit
+    return numbers
+
+
+_SPELLED = _spelled_numbers()
+# The longest first, else the "five" of "twenty five" would be a number by itself.
+_SPELLED_WORDS = "|".join(sorted(_SPELLED, key=len, reverse=True)).replace("-", r"[-\s]")
+_NUMBER = rf"(\d+|\b(?:{_SPELLED_WORDS})\b)"
 _MINUTES = re.compile(
     rf"{_NUMBER}(?:\s*(?:-|–|to|bis|à|a|do|tot)\s*{_NUMBER})?\s*(?:min(?:ut)?\w*\b|分)", re.IGNORECASE
 )
@@ -330,9 +349,13 @@ def stated_minutes(text: str) -> int | None:
     (15, 20, None)
     >>> stated_minutes("It takes about two minutes."), stated_minutes("zehn bis fünfzehn Minuten")
     (2, 15)
+    >>> stated_minutes("forty-five minutes"), stated_minutes("twenty five to thirty minutes")
+    (45, 30)
+    >>> stated_minutes("fünfundzwanzig Minuten"), stated_minutes("five-ten minutes")
+    (25, 10)
     """
     spelled = [number for match in _MINUTES.finditer(text) for number in match.groups() if number]
-    minutes = [_SPELLED.get(number.lower()) or int(number) for number in spelled]
+    minutes = [_SPELLED.get("-".join(number.lower().split())) or int(number) for number in spelled]
     return max(minutes, default=None)
 
 
