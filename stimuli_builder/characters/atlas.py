@@ -4,6 +4,7 @@ The atlas holds one full open-eye frame and, for a rising list of closures, the 
 """
 
 import hashlib
+import lzma
 import shutil
 import subprocess
 import tarfile
@@ -545,13 +546,21 @@ def _take(name: str, retired: Retired, source: Path, draft: Path) -> None:
         (draft / path.rpartition("/")[2]).write_bytes(data)
 
 
+UNREADABLE = (
+    *(tarfile.TarError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+    *(EOFError, OSError, KeyError, RuntimeError),
+)
+"""What archives end in that are damaged, or a zip file with a password."""
+
+
 def _files_in_release(name: str, retired: Retired, release: Path) -> dict[str, bytes]:
     """The character's files in a release file by their paths: a wheel or zip, or a source archive."""
 
     def belongs(path: str) -> bool:
         # Whatever folders are before it; a character's folder has no others in it.
         parent, _, file = path.rpartition("/")
-        return bool(file) and f"/{parent}".endswith(f"/{retired.folder}")
+        # A backslash would lead out of the folder on Windows.
+        return bool(file) and "\\" not in file and f"/{parent}".endswith(f"/{retired.folder}")
 
     try:
         if zipfile.is_zipfile(release):
@@ -561,8 +570,7 @@ def _files_in_release(name: str, retired: Retired, release: Path) -> dict[str, b
             with tarfile.open(release) as tar:
                 held = {one.name: tar.extractfile(one) for one in tar.getmembers() if belongs(one.name)}
                 files = {path: content.read() for path, content in held.items() if content is not None}
-    # Damaged archives end in any of these.
-    except (tarfile.TarError, zipfile.BadZipFile, EOFError, zlib.error) as error:
+    except UNREADABLE as error:
         raise InputError(
             f"{release}: expected a release file (.whl, .tar.gz or .zip) that can be read: {error}"
         ) from error

@@ -1,5 +1,6 @@
 """A character that left the tree comes back byte for byte, or one line says why not."""
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -97,17 +98,29 @@ def test_it_comes_out_of_a_release_file(
     }
 
 
-def test_a_file_that_is_no_release_is_one_line(repository: Path, tmp_path: Path) -> None:
+def test_a_file_that_is_no_release_is_one_line(
+    repository: Path, tiny_character: Path, tmp_path: Path
+) -> None:
     wrong, other = tmp_path / "notes.zip", tmp_path / "other"
     wrong.write_text("no archive")
     (other / "pictures").mkdir(parents=True)
     empty = Path(shutil.make_archive(str(tmp_path / "empty"), "zip", other))
     cut = Path(shutil.make_archive(str(tmp_path / "cut"), "gztar", repository))
     cut.write_bytes(cut.read_bytes()[:-200])
+    spoiled = Path(shutil.make_archive(str(tmp_path / "spoiled"), "xztar", repository))
+    content = bytearray(spoiled.read_bytes())
+    content[len(content) // 2] ^= 255
+    spoiled.write_bytes(content)
+    shutil.copytree(tiny_character, tmp_path / "held" / FOLDER)
+    secret = Path(shutil.make_archive(str(tmp_path / "secret"), "zip", tmp_path / "held"))
+    # The flag of encryption in each entry of the directory at the end.
+    secret.write_bytes(re.sub(rb"(PK\x01\x02.{4}).", b"\\g<1>\x01", secret.read_bytes(), flags=re.DOTALL))
     for file, said in (
         (wrong, "expected a release file"),
         (empty, "does not contain 'old'"),
         (cut, "expected a release file"),
+        (spoiled, "expected a release file"),
+        (secret, "expected a release file"),
     ):
         with pytest.raises(InputError, match=said):
             restore("old", file, tmp_path / "data" / "old")
