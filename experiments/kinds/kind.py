@@ -110,6 +110,8 @@ class Kind:
         Whether answers decide what is shown next: the server then follows its series.
     fault : callable
         What in the declared [trial] does not fit the rest of the experiment, as `path: what to do`, or None.
+    doubt : callable
+        What in the declared [trial] is possible but most likely a mistake, as `path: what to do`, or None.
     power : callable
         The `analysis plan` that computes the power of the declared design; InputError if that is impossible.
     chooses : callable
@@ -135,6 +137,7 @@ class Kind:
     further_examples: tuple[str, ...] = ()
     plan: Callable[[Experiment], tuple[str, ...]] = nothing_more
     fault: Callable[[Experiment], str | None] = nothing_wrong
+    doubt: Callable[[Experiment], str | None] = nothing_wrong
     power: Callable[[Experiment], PlanCommand] = power_of_means
     check_response: Callable[[Mapping[str, Any]], int | None] = lambda _: None
     check_choices: Callable[[Experiment], int] = two_choices

@@ -35,6 +35,7 @@ from experiments.kinds.threshold_grid import (
     series_in_group,
     series_of,
     standard_beside,
+    standard_doubt,
     standard_of,
     stimuli,
 )
@@ -444,6 +445,7 @@ THRESHOLD = Kind(
     further_examples=FURTHER_EXAMPLES,
     plan=plan,
     fault=fault,
+    doubt=standard_doubt,
     power=power_of_thresholds,
     check_response=check_response,
     adapts=True,

@@ -206,6 +206,31 @@ def tested_levels(trial: Threshold, levels: list[str]) -> list[str]:
     return [level for level in levels if level != standard]
 
 
+def standard_doubt(experiment: Experiment) -> str | None:
+    """Stimuli on the wrong side of a standard with a number: fewer than half choose them.
+
+    The function of two intervals begins at one half, so no threshold describes such answers.
+    """
+    trial = threshold_of(experiment)
+    if not isinstance(trial.task, TwoInterval):
+        return None
+    standard = number_of(trial.stimulus.values, trial.task.standard)
+    levels = [level.name for level in experiment.factor(trial.stimulus.factor).levels]
+    numbers = [number_of(trial.stimulus.values, name) for name in tested_levels(trial, levels)]
+    rising = trial.direction == "rising"
+    if standard is None:
+        return None
+    wrong = sorted(one for one in numbers if one is not None and (one < standard) == rising)
+    if not wrong:
+        return None
+    named = f"{'stimulus' if len(wrong) == 1 else 'stimuli'} {', '.join(f'{one:g}' for one in wrong)}"
+    return (
+        f"trial.task.standard: expected a standard {'below' if rising else 'above'} all stimuli, got "
+        f"{standard:g} with the {named}; a {trial.direction} function of two intervals begins at one half, "
+        f"but people choose such stimuli less often"
+    )
+
+
 def number_of(values: Mapping[str, float], level: str) -> float | None:
     """The number of a level: that declared, or the one it is named by; None where it has none."""
     if level in values:

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 
 from experiments.declaration.experiment import Experiment
 from experiments.errors import counted
-from experiments.kinds import expected_minutes
+from experiments.kinds import KINDS, expected_minutes
 from experiments.level_leaks import reported_leaks
 from experiments.manifest import CheckClip, Clip, Manifest
 from experiments.wording import (
@@ -172,6 +172,14 @@ def _levels_told_apart(launch: LaunchState) -> Iterator[LaunchCheck]:
     for sentence in reported_leaks(manifest.clips):
         text = f"{sentence[:1].upper()}{sentence[1:]}."
         yield LaunchCheck(kind="levels_told_apart", blocks=False, text=text, page="clips")
+
+
+def _doubtful_trial(launch: LaunchState) -> Iterator[LaunchCheck]:
+    """A declared trial that is possible but most likely a mistake."""
+    if doubt := KINDS[launch.experiment.trial.kind].doubt(launch.experiment):
+        path, _, said = doubt.partition(": ")
+        text = f"{said[:1].upper()}{said[1:]}."
+        yield LaunchCheck(kind="doubtful_trial", blocks=False, text=text, page="build", path=path)
 
 
 def _translations(launch: LaunchState) -> Iterator[LaunchCheck]:
@@ -417,6 +425,7 @@ _ADVISING: tuple[Check, ...] = (
     _time,
     _pay,
     _translations,
+    _doubtful_trial,
     _levels_told_apart,
     _clip_size,
     _running,

@@ -33,6 +33,8 @@ def summary(experiment: Experiment) -> dict[str, Any]:
         - `notes`, what the kind of trial adds, such as counts of pairs;
         - `repeated_profiles`, a list of {exemplar, profile, group}: recordings that stand for a second one.
     """
+    kind = KINDS[experiment.trial.kind]
+    doubt = kind.doubt(experiment)
     return {
         "name": experiment.name,
         "title": experiment.title,
@@ -53,7 +55,7 @@ def summary(experiment: Experiment) -> dict[str, Any]:
         "blocks": [block._asdict() for block in block_sizes(experiment)],
         "order": experiment.blocks.order,
         "expected_minutes": expected_minutes(experiment),
-        "notes": list(KINDS[experiment.trial.kind].plan(experiment)),
+        "notes": [*kind.plan(experiment), *([f"check {doubt}"] if doubt else [])],
         "repeated_profiles": repeated_profiles(experiment),
     }
 

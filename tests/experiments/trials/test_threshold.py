@@ -155,6 +155,23 @@ def test_the_plan_without_answers_covers_the_grid() -> None:
     assert max(shown.values()) - min(shown.values()) <= 1
 
 
+@pytest.mark.parametrize(
+    ("standard", "direction", "said"),
+    [
+        ("100", "rising", None),
+        ("400", "falling", None),
+        ("300", "rising", "expected a standard below all stimuli, got 300 with the stimuli 100, 200;"),
+        ("300", "falling", "expected a standard above all stimuli, got 300 with the stimulus 400;"),
+        ("400", "rising", "got 400 with the stimuli 100, 200, 300; a rising function"),
+    ],
+)
+def test_a_standard_between_the_stimuli_is_doubted(standard: str, direction: str, said: str | None) -> None:
+    """Fewer than half choose a stimulus below the standard, and no function from one half up has that."""
+    text = TWO.replace('standard = "100"', f'standard = "{standard}"')
+    doubt = THRESHOLD.doubt(declared(text.replace("stop =", f'direction = "{direction}"\nstop =', 1)))
+    assert doubt is None if said is None else doubt is not None and said in doubt
+
+
 def test_two_intervals_hold_the_standard_in_either_order_and_the_same_exemplar() -> None:
     main = [trial for seed in range(4) for trial in THRESHOLD.assign(declared(TWO), seed, 0) if trial.series]
     firsts = Counter(trial.shown[0].clip.level("duration") == "100" for trial in main)

@@ -25,6 +25,7 @@ from server.transcoding.preparing import StoredClips
 from tests.helpers.admins import Admin
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
+from tests.helpers.thresholds import TWO_INTERVAL, text_with
 from tests.helpers.tiny_clips import make_clip_folder
 from tests.helpers.uploads import upload
 
@@ -380,3 +381,17 @@ def test_a_version_saved_while_the_study_is_set_live_is_refused(
     assert "was set live meanwhile" in refused.json()["error"]["message"]
     monkeypatch.setattr(creation, "planned_experiment", planned)
     assert owner.send("POST", "/studies/short/versions", body).status_code == 201
+
+
+def test_a_standard_between_the_stimuli_is_named(owner: Admin, services: Services, tmp_path: Path) -> None:
+    declared = text_with(SHORT, TWO_INTERVAL.replace('"100"', '"300"'))
+    add_study(services, tmp_path / "clips", declared, status="draft")
+    [check] = [
+        one
+        for one in owner.get("/studies/short/launch-checks").json()
+        if one["path"] == "trial.task.standard"
+    ]
+    assert check["text"].startswith(
+        "Expected a standard below all stimuli, got 300 with the stimuli 100, 200;"
+    )
+    assert (check["blocks"], check["page"]) == (False, "build")
