@@ -365,7 +365,7 @@ def bayes_factors(analysis: Analysis) -> Section:
         name = analysis.labels.pair(pair.cell_a, pair.cell_b)
         # A factor that underflows to 0 has an infinite reciprocal.
         reverse = 1 / bf if bf else inf
-        rows.append((name, fixed(pair.t), _factor(bf), _factor(reverse), _in_words(bf)))
+        rows.append((name, fixed(pair.t), factor_text(bf), factor_text(reverse), _in_words(bf)))
     header = ("Margin: pair", "t", "BF₁₀", "BF₀₁", "Evidence")
     table = Table(
         "bayes", caption("Bayes factors of pairs", analysis.name, analysis.synthetic), header, tuple(rows), 1
@@ -380,14 +380,15 @@ def bayes_factors(analysis: Analysis) -> Section:
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def _factor(value: float) -> str:
+def factor_text(value: float) -> str:
+    """A Bayes factor, which has no upper bound: with its leading zero, large ones as powers of ten."""
     if not isfinite(value):
         return DASH
     if value >= 1000:
         mantissa, exponent = f"{value:.1e}".split("e+")
         return f"{mantissa} × 10{str(int(exponent)).translate(_RAISED)}"
     if value < 0.001:
-        return "<.001"
+        return "<0.001"
     return fixed(value, 2 if value >= 0.1 else 3)
 
 

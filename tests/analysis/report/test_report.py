@@ -13,7 +13,7 @@ from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
 from analysis.plans.clip_rating import READING, analyse_study
 from analysis.plans.result import Analysis, analyse_cells
-from analysis.plans.sensitivity import bayes_factors
+from analysis.plans.sensitivity import bayes_factors, factor_text
 from analysis.read.study_answers import StudyAnswers, load_csv
 from analysis.report.figures import draw, figures_of
 from analysis.report.formats import Table, as_markdown, as_text, wrap
@@ -203,6 +203,14 @@ def test_bayes_factors_are_next_to_the_planned_pairs(tmp_path) -> None:
 )
 def test_numbers_are_printed_as_apa_has_them(made, text) -> None:
     assert made == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0004, "<0.001"), (0.05, "0.050"), (3.456, "3.46"), (1.23e10, "1.2 × 10¹⁰"), (float("inf"), "–")],
+)
+def test_a_bayes_factor_may_exceed_one_and_so_keeps_its_zero(value: float, text: str) -> None:
+    assert factor_text(value) == text
 
 
 def test_every_pair_of_one_factor_has_a_bayes_factor(tmp_path) -> None:
