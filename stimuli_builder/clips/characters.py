@@ -62,7 +62,7 @@ def fingerprint(name: str, beside: Path | None = None) -> str:
     return find_character(name, beside).fingerprint
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=3)
 def _drawn(name: str) -> Character:
     from stimuli_builder.clips.character_levels import DRAWN_LOOKS, CartoonCharacter
 

@@ -392,7 +392,7 @@ export function gridProblem(cells: NewCells): string | false {
 /** The levels of each factor that has a name. */
 export const levelsOfCells = (cells: NewCells) => factorsOf(designOfTyped(cells)).map(({ levels }) => levels);
 
-/** Columns of the table that are no factors. */
+/** Columns that the table has next to the factors. */
 const TABLE_COLUMNS = ["file", "exemplar"];
 const quoted = (text: string) => `"${text.replaceAll('"', '""')}"`;
 
