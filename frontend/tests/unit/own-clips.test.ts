@@ -13,6 +13,7 @@ import {
   placesToSave,
   slotsOf,
   tableOfCells,
+  tableToFill,
   withMoved,
   withRenames,
 } from "../../src/admin/builder/places";
@@ -99,6 +100,10 @@ describe("the grid of a new study", () => {
       { name: "constructor", levels: ["a", "IMG"] },
       { name: "valueOf", levels: ["b", "1", "2", "3", "10"] },
     ]);
+  });
+
+  it("may also be a table, whose first column has every name whole", () => {
+    expect(tableToFill(["a.mp4", "left, up.mp4", '5".mp4'])).toBe('file,factor\na.mp4,\n"left, up.mp4",\n"5"".mp4",');
   });
 
   it("begins with what a pattern reads", () => {

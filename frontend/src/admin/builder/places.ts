@@ -405,3 +405,8 @@ export function tableOfCells(cells: NewCells): string {
   );
   return [["file", ...names, "exemplar"], ...rows].map((row) => row.map(quoted).join(",")).join("\n");
 }
+
+/** A table of levels to be filled in: each file with an empty cell. */
+export function tableToFill(files: readonly string[]): string {
+  return ["file,factor", ...files.map((file) => `${/[",]/.test(file) ? quoted(file) : file},`)].join("\n");
+}

@@ -3,7 +3,16 @@
 import { Alert, Button, Input, SegmentedControl, SimpleGrid, Stack, Table, Text, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import type { Schemas } from "../api";
-import { cellsByPattern, gridProblem, levelsOfCells, type NewCells, reconciled, tableOfCells, uploadedPlaces } from "../builder/places";
+import {
+  cellsByPattern,
+  gridProblem,
+  levelsOfCells,
+  type NewCells,
+  reconciled,
+  tableOfCells,
+  tableToFill,
+  uploadedPlaces,
+} from "../builder/places";
 import { StillNeeded } from "../clips/UploadClips";
 import { onDemand } from "../ui/Answer";
 import type { TemplateWords } from "./templates";
@@ -51,7 +60,7 @@ export function Levels({ name, template, upload, isLooked, notPlayed, refused, i
   // As the files suggest it, also after one was left out or came, until it is written.
   const [written, setWritten] = useState<{ pattern?: string; csv?: string }>({});
   const pattern = written.pattern ?? upload.suggested_pattern ?? "";
-  const csv = written.csv ?? `file,factor\n${upload.files.map((file) => `${file.name},`).join("\n")}`;
+  const csv = written.csv ?? tableToFill(upload.files.map((file) => file.name));
   // Until a question is written, it is the template's.
   const [typed, setAsked] = useState({ title: "", question: null as string | null, low: "very unnatural", high: "very natural" });
   const asked = { ...typed, question: typed.question ?? template.question };
