@@ -52,11 +52,11 @@ def refuse_broken_installation() -> None:
         Names the file, or the package and its folder.
     """
     if damaged := damaged_files():
-        more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
-        raise InputError(
-            f"the installation is damaged: {damaged[0]}{more} is missing or has another size; install "
-            f"Palpebra again: {REINSTALL}"
-        )
+        first, *others = damaged
+        found = f"{first} is missing or has another size"
+        if others:
+            found = f"{first} and {len(others)} more are missing or have another size"
+        raise InputError(f"the installation is damaged: {found}; install Palpebra again: {REINSTALL}")
     for name, place in foreign_packages().items():
         raise InputError(
             f"package '{name}': expected Palpebra's, got the one in {place}; install Palpebra in a separate "
