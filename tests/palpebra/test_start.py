@@ -102,7 +102,7 @@ def test_a_damaged_record_is_no_traceback(tmp_path: Path, monkeypatch: pytest.Mo
     (folder / "RECORD").write_text(record, encoding="utf-8")
     monkeypatch.setattr(metadata, "distribution", lambda _: metadata.Distribution.at(folder))
     assert damaged_files() == ["short.py", "cut.py"]
-    with pytest.raises(InputError, match="short.py and 1 more are missing or have another size; install"):
+    with pytest.raises(InputError, match=r"short\.py and 1 more are missing or have another size; install"):
         refuse_broken_installation()
 
 
