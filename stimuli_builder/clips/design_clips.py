@@ -11,6 +11,7 @@ from blink_engine import Event, Law, Parameters, Performance, StateChange, defau
 from blink_engine.speech import Speech, seed_of_speaker, speech_events, speech_states
 from experiments import design
 from experiments.declaration.experiment import Experiment
+from experiments.declaration.factors import Level
 from experiments.declaration.rendering import PROFILES, RenderSettings
 from experiments.declaration.trial import ClipSpec
 from experiments.errors import InputError, did_you_mean
@@ -231,12 +232,21 @@ def check_levels(experiment: Experiment) -> None:
             continue
         for number, level in enumerate(factor.levels):
             for other in factor.levels[:number]:
-                if other.render == level.render:
+                if _renders_alike(experiment.render, other, level):
                     raise InputError(
                         f"factor '{factor.name}': '{other.name}' and '{level.name}' do not change the "
                         "rendering, so their clips would be the same. Add `render` to them, or write the "
                         "manifest of your own clips with `stimuli manifest`"
                     )
+
+
+def _renders_alike(declared: RenderSettings, one: Level, other: Level) -> bool:
+    if one.render == other.render:
+        return True
+    # A performance uses neither, so levels that differ in them alone show the same.
+    without = {"anticipation": 0.0, "settle": 0.0}
+    shown = [level.render.applied_to(declared).model_copy(update=without) for level in (one, other)]
+    return shown[0].performance is not None and shown[0] == shown[1]
 
 
 def _planned(experiment: Experiment, options: Options) -> Iterator[PlannedClip]:

@@ -6,11 +6,13 @@ from typing import Any
 import pytest
 
 from experiments.errors import InputError
-from experiments.load import load_experiment
+from experiments.load import load_experiment, parse_experiment
 from experiments.manifest import check_files, check_originals, file_sha256, read_manifest
 from server.core.storage import FolderStore
 from server.studies.creation import store_clips
 from stimuli_builder.cli import main
+from stimuli_builder.clips.design_clips import check_levels
+from tests.conftest import REPOSITORY
 from tests.helpers.tiny_clips import encoded_video
 from tests.helpers.videos import HEIGHT, WIDTH, write_sound, write_video
 from video_conversion.video_file import examine
@@ -264,3 +266,12 @@ def test_a_quicktime_clip_of_an_older_manifest_is_named_with_advice_that_can_be_
     store_clips(
         FolderStore(clips.parent / "store"), read_manifest(clips.parent / "again"), clips.parent / "again"
     )
+
+
+def test_levels_that_differ_in_what_a_performance_ignores_are_refused() -> None:
+    text = (REPOSITORY / "experiments" / "pairs-demo.toml").read_text(encoding="utf-8")
+    text = text.replace('profile = "SL"', 'profile = "phases", anticipation = 1.0, settle = 0.5')
+    check_levels(parse_experiment(text))
+    performed = text.replace("[exemplars]", '[render]\nperformance = "uniform"\n\n[exemplars]', 1)
+    with pytest.raises(InputError, match="'model' and 'textbook' do not change the rendering"):
+        check_levels(parse_experiment(performed))
