@@ -1,5 +1,6 @@
 """`palpebra` and `palpebra demo`: the server with the embedded default, and the browser on the first page."""
 
+import math
 import os
 import shlex
 import threading
@@ -78,7 +79,7 @@ def first_page(welcome: "Welcome", folder: Path) -> str:
     """
     known = {"folder": str(folder)}
     if link := demo_link(welcome):
-        known |= {"demo": link.path, "minutes": str(max(1, round(link.minutes)))}
+        known |= {"demo": link.path, "minutes": str(max(1, math.ceil(link.minutes)))}
     if welcome.invitation:
         known["invitation"] = welcome.invitation
     return f"/admin/start#{urlencode(known, quote_via=quote)}"

@@ -133,17 +133,91 @@ def check(experiment: Experiment, rows: pd.DataFrame, source: str) -> None:
 
 
 def analyse(prepared: PlanRows) -> Contents:
-    """Abilities of the cells and all that goes with them, in each group where groups see different cells."""
+    """Abilities of the cells and all that goes with them, in each group where groups see different cells.
+
+    Clips that were compared within scenes are cells of the compared factor, with abilities that all scenes
+    share: no comparison joins the cells of different scenes.
+    """
+    apart = scene_factors(prepared.experiment)
+    merged = over_scenes(prepared, apart)
     if len(groups(prepared.experiment)) > 1:
-        return contents_of_groups(prepared, analyse)
+        return contents_of_groups(merged, analyse)
     from analysis.report.pairs_contents import contents_of
 
-    comparisons = comparisons_of(prepared)
-    factors = factors_of(prepared.experiment, comparisons.items)
-    return contents_of(prepared, comparisons, findings_of(comparisons, factors), factors)
+    comparisons = comparisons_of(merged)
+    factors = factors_of(merged.experiment, comparisons.items)
+    contents = contents_of(merged, comparisons, findings_of(comparisons, factors), factors)
+    return _with_agreement_of_scenes(contents, prepared, apart) if apart else contents
 
 
 PLAN = Plan(READING, check, analyse, number_answers)
+
+
+# Pairs within scenes, or within whatever else clips differ in: the abilities that all scenes share.
+
+
+def scene_factors(experiment: Experiment) -> tuple[str, ...]:
+    """Factors within whose levels clips are compared, such as the scene; none where all are compared."""
+    pairs = paired_comparison_of(experiment).pairs
+    if pairs.among != "within":
+        return ()
+    return tuple(one.name for one in experiment.factors if one.name != pairs.factor and not one.between)
+
+
+def over_scenes(prepared: PlanRows, apart: Sequence[str]) -> PlanRows:
+    """The comparisons with cells that are named, and declared, without the factors of `apart`."""
+    if not apart:
+        return prepared
+    experiment = prepared.experiment
+    kept = [index for index, factor in enumerate(experiment.factors) if factor.name not in apart]
+    named = {name: "/".join(levels[index] for index in kept) for name, levels in cells_of(experiment)}
+    rows = prepared.rows.assign(
+        **{
+            column: pd.Categorical(prepared.rows[column].astype(str).map(named))
+            for column in ("left_cell", "right_cell")
+        }
+    )
+    return replace(
+        prepared,
+        experiment=experiment.model_copy(
+            update={"factors": tuple(experiment.factors[index] for index in kept)}
+        ),
+        exclusions=replace(prepared.exclusions, rows=rows),
+    )
+
+
+def _with_agreement_of_scenes(contents: Contents, prepared: PlanRows, apart: Sequence[str]) -> Contents:
+    """The report with a test that all scenes have the same abilities."""
+    experiment, labels = prepared.experiment, labels_of(prepared.experiment)
+    at = [index for index, factor in enumerate(experiment.factors) if factor.name in apart]
+    scene = prepared.rows["left_cell"].astype(str).map(lambda cell: [cell.split("/")[index] for index in at])
+    every = [
+        comparisons_of(replace(prepared, exclusions=replace(prepared.exclusions, rows=rows)))
+        for _, rows in prepared.rows.groupby(scene.map("/".join), observed=True)
+    ]
+    kept = [index for index in range(len(experiment.factors)) if index not in at]
+    test, reason = _tested_agreement([_without(one, kept) for one in every], "scenes")
+    what = " and ".join(labels.factor(name) for name in apart)
+    numbers = {
+        "within": list(apart),
+        "agreement": None if test is None else {"chi2": test.chi2, "df": test.df, "p": test.p},
+        "agreement_reason": reason,
+    }
+    return replace(
+        contents,
+        parts=(
+            *contents.parts,
+            _agreement_part(test, reason, contents.name, prepared.synthetic, f"levels of {what}"),
+        ),
+        methods=SCENES.format(what=what) + contents.methods,
+        numbers=contents.numbers | numbers,
+    )
+
+
+SCENES = (
+    "Clips were compared only within the same level of {what}. Abilities are common to all levels, and their "
+    "agreement is tested by a likelihood ratio: separate abilities in each level against common abilities. "
+)
 
 
 # Paired comparisons of groups of participants: the abilities in each group, and whether groups agree.
@@ -223,29 +297,34 @@ def _agreement(
         return None, "only one group has comparisons"
     # Cells of different groups are the same once the factors between groups are left out.
     within = [index for index, factor in enumerate(experiment.factors) if not factor.between]
-    named = [_without_groups(one, within) for one in every]
+    return _tested_agreement([_without(one, within) for one in every], "groups")
+
+
+def _tested_agreement(named: Sequence[Comparisons], what: str) -> tuple[LikelihoodRatio | None, str | None]:
+    """The likelihood ratio of equation (1) of `_agreement`, of comparisons whose items have common names."""
+    if len(named) < 2:
+        return None, f"only one of the {what} has comparisons"
     # Common abilities need common cells.
     if any(set(one.items) != set(named[0].items) for one in named):
-        return None, "the groups compared different cells"
+        return None, f"the {what} compared different cells"
     pooled = _together(named)
-    # All models must have the same parameters: with ties in one group, ties in all.
+    # All models must have the same parameters: with ties in one, ties in all.
     method: Method = "davidson" if pooled.ties else "bradley-terry"
     try:
         own = [fit_abilities(one, method) for one in named]
         same = fit_abilities(pooled, method)
     except InputError as error:
-        return None, str(error)
+        # Without the options of a command, which a report has not.
+        return None, str(error).removeprefix(f"{pooled.source}: ").partition("; add --")[0]
     # Rounding may put the sum just below the common fit.
     chi2 = max(0.0, 2 * (sum(one.log_likelihood for one in own) - same.log_likelihood))
-    df = (len(every) - 1) * (len(pooled.items) - 1 + (method == "davidson"))
+    df = (len(named) - 1) * (len(pooled.items) - 1 + (method == "davidson"))
     return LikelihoodRatio(chi2, df, float(stats.chi2.sf(chi2, df))), None
 
 
-def _without_groups(one: Comparisons, within: list[int]) -> Comparisons:
-    """The cells named by their levels in factors within participants."""
-    return replace(
-        one, items=tuple("/".join(item.split("/")[index] for index in within) for item in one.items)
-    )
+def _without(one: Comparisons, kept: list[int]) -> Comparisons:
+    """The cells named by their levels in the factors at these places."""
+    return replace(one, items=tuple("/".join(item.split("/")[index] for index in kept) for item in one.items))
 
 
 def _together(every: Sequence[Comparisons]) -> Comparisons:
@@ -264,17 +343,18 @@ def _together(every: Sequence[Comparisons]) -> Comparisons:
     )
 
 
-def _agreement_part(test: LikelihoodRatio | None, reason: str | None, name: str, synthetic: bool) -> Part:
+def _agreement_part(
+    test: LikelihoodRatio | None, reason: str | None, name: str, synthetic: bool, what: str = "groups"
+) -> Part:
+    title = f"Agreement of the {what}"
     if test is None:
-        return Part((), (f"Agreement of the groups was not tested: {reason}.",), "Agreement of the groups")
+        return Part((), (f"{title} was not tested: {reason}.",), title)
     verdict = "differed" if test.p < 0.05 else "did not differ significantly"
-    said = f"Abilities {verdict} between the groups, χ²({test.df}) = {fixed(test.chi2)}, {apa_p(test.p)}."
-    row = ("Same abilities in all groups", fixed(test.chi2), str(test.df), p_value(test.p))
+    said = f"Abilities {verdict} between the {what}, χ²({test.df}) = {fixed(test.chi2)}, {apa_p(test.p)}."
+    row = (f"Same abilities in all {what}", fixed(test.chi2), str(test.df), p_value(test.p))
     header = ("Hypothesis", "χ²", "df", "p")
-    table = Table(
-        "agreement-of-groups", caption("Agreement of the groups", name, synthetic), header, (row,), 1
-    )
-    return Part((table,), (said,), "Agreement of the groups")
+    table = Table("agreement-of-groups", caption(title, name, synthetic), header, (row,), 1)
+    return Part((table,), (said,), title)
 
 
 def _numbers(

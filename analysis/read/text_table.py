@@ -246,7 +246,8 @@ def _columns_there(name: str, header: Sequence[str]) -> str:
     if near:
         return f"; did you mean '{near}'?"
     rest = len(header) - NAMED_COLUMNS
-    return f"; its columns are {', '.join(header[:NAMED_COLUMNS])}{f' and {rest} more' if rest > 0 else ''}"
+    named = f"{', '.join(header[:NAMED_COLUMNS])}{f' and {rest} more' if rest > 0 else ''}"
+    return f"; its columns are {named} (`analysis columns FILE` says which command and options fit)"
 
 
 def _lines_above(header: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from analysis.models.residuals import ResidualChecks
 from analysis.opinion import OpinionResult
 from analysis.plans.result import Analysis
 from analysis.report.contents import Section, caption, mark_name
-from analysis.report.formats import Table
+from analysis.report.formats import Table, as_sentence
 from analysis.report.numbers import DASH, fixed, interval, p_value, share
 from analysis.report.r_script import robust_files
 from analysis.report.rank_tables import bayes_text
@@ -149,7 +149,7 @@ def mixed_text(result: MixedResult) -> str:
         f"ratings {of_items}by {result.n_participants} participants. Type III tests with "
         f"{DF_NAMES[result.df_method]} degrees of freedom."
     ]
-    return " ".join([*said, *(f"{note}." for note in result.notes)])
+    return " ".join([*said, *map(as_sentence, result.notes)])
 
 
 def _integral(nodes: int) -> str:
@@ -178,7 +178,7 @@ def ordinal_text(result: OrdinalResult) -> str:
             "Random intercepts only: if people differ in the size of an effect, its p is too small. Add "
             "--slopes all to model these differences."
         )
-    return " ".join([*said, *(f"{note}." for note in result.notes)])
+    return " ".join([*said, *map(as_sentence, result.notes)])
 
 
 # Opinion scores as tables and words.
@@ -245,7 +245,7 @@ def opinion_text(result: OpinionResult, name: str, synthetic: bool = False) -> s
     ]
     if rejected and not any("BT.500" in decision for decision in result.decisions):
         said.append(f"BT.500 would reject {', '.join(rejected)}; add --screen bt500 to exclude them.")
-    return " ".join([*said, *(f"{decision}." for decision in result.decisions)])
+    return " ".join([*said, *map(as_sentence, result.decisions)])
 
 
 # Reliability and agreement as tables and words.
@@ -259,7 +259,7 @@ def reliability_text(result: Reliability, name: str, synthetic: bool = False) ->
         f"{mark_name(name, synthetic)}: {len(result.items)} items, {result.n_cases} cases; Cronbach's "
         f"alpha = {alpha}; {omega}."
     )
-    return " ".join([said, *(f"{decision}." for decision in result.decisions)])
+    return " ".join([said, *map(as_sentence, result.decisions)])
 
 
 def items_table(result: Reliability, name: str, synthetic: bool = False) -> Table:
@@ -288,7 +288,7 @@ def agreement_text(result: Agreement, name: str, synthetic: bool = False) -> str
         f"{result.n_people} people; Krippendorff's alpha ({result.level}) = {alpha} (items resampled)."
     )
     reason = [f"{result.icc_reason}."] if result.icc_reason else []
-    return " ".join([said, *reason, *(f"{decision}." for decision in result.decisions)])
+    return " ".join([said, *reason, *map(as_sentence, result.decisions)])
 
 
 def intraclass_table(result: Agreement, name: str, synthetic: bool = False) -> Table:

@@ -15,6 +15,7 @@ from analysis.plans.plan import study_contents
 from analysis.read.pool import Origin, Pool
 from analysis.read.study_answers import load_csv
 from experiments import rules
+from experiments.declaration.paired_comparison import WithinFactor
 from experiments.errors import InputError
 from experiments.load import load_experiment
 from experiments.schema.canonical import definition_sha256
@@ -331,3 +332,51 @@ def test_the_agreement_of_groups_is_the_deviance_between_two_logistic_regression
     one = sm.Logit(left, side[:, None]).fit(disp=0)
     assert found.numbers["agreement"]["chi2"] == pytest.approx(2 * (both.llf - one.llf), abs=1e-6)
     assert found.numbers["agreement"]["df"] == 1
+
+
+def within_characters(**abilities: float):
+    """The demo with pairs of one character each, and 30 people's choices."""
+    pairs = WithinFactor(factor="blink")
+    experiment = DEMO.model_copy(update={"trial": DEMO.trial.model_copy(update={"pairs": pairs})})
+    rows = [
+        row
+        for row in compare(DEMO, ABILITIES | abilities, 30)
+        if row["left_cell"].split("/")[0] == row["right_cell"].split("/")[0]
+    ]
+    return experiment, rows
+
+
+@pytest.mark.parametrize("agree", [True, False])
+def test_pairs_within_scenes_have_abilities_that_scenes_share_and_a_test_of_that(tmp_path, agree) -> None:
+    """No comparison joins the cells of two characters: of the cells themselves nothing can be fitted."""
+    experiment, rows = within_characters(**{"cartoon/textbook": -0.3 if agree else 2.0})
+    found = report(tmp_path, rows, experiment)
+    sign = np.array([float(row["left_cell"].endswith("textbook")) * 2 - 1 for row in rows])
+    left = [row["winner"] == "left" for row in rows]
+    cartoon = np.array([row["left_cell"].startswith("cartoon") for row in rows])
+    common = sm.Logit(left, sign[:, None]).fit(disp=0)
+    own = sm.Logit(left, np.column_stack([sign, sign * cartoon])).fit(disp=0)
+    model, textbook = found.numbers["abilities"]["items"]
+    assert (model["name"], textbook["name"]) == ("model", "textbook")
+    assert textbook["ability"] == pytest.approx(common.params[0], abs=1e-6)
+    assert textbook["se"] == pytest.approx(common.bse[0], abs=1e-6)
+    chi2 = 2 * (own.llf - common.llf)
+    assert found.numbers["within"] == ["character"]
+    agreement = found.numbers["agreement"]
+    assert (agreement["chi2"], agreement["df"]) == (pytest.approx(chi2, abs=1e-6), 1)
+    assert (agreement["p"] < 0.05) is not agree
+    *_, said = [sentence for part in found.parts for sentence in part.sentences]
+    verdict = "did not differ significantly" if agree else "differed"
+    assert said.startswith(f"Abilities {verdict} between the levels of Character, χ²(1) = ")
+    assert "Clips were compared only within the same level of Character." in found.methods
+
+
+def test_a_scene_whose_abilities_cannot_be_fitted_is_named_and_the_rest_is_reported(tmp_path) -> None:
+    experiment, rows = within_characters()
+    rows = change(rows, lambda row: row["left_cell"] == "cartoon/model", winner="left")
+    rows = change(rows, lambda row: row["right_cell"] == "cartoon/model", winner="right")
+    found = report(tmp_path, rows, experiment)
+    assert found.numbers["abilities"] is not None
+    assert found.numbers["agreement"] is None
+    said = "textbook lost every comparison with the others, so no finite ability fits"
+    assert found.numbers["agreement_reason"] == said

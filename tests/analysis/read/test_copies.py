@@ -61,7 +61,7 @@ def test_a_file_pasted_twice_is_named_by_each_command(command: str, tmp_path: Pa
     n = len(rows)
     assert "pasted twice" not in said(command, rows, tmp_path)
     output = said(command, pd.concat([rows, rows]), tmp_path)
-    assert f"lines {n + 2} to {2 * n + 1} are exact copies of lines 2 to {n + 1} ({n} rows)" in output
+    assert f"ines {n + 2} to {2 * n + 1} are exact copies of lines 2 to {n + 1} ({n} rows)" in output
 
 
 def test_copies_of_a_part_and_of_sorted_rows_are_named(tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ def test_a_name_that_fits_in_two_ways_is_refused(tmp_path) -> None:
 def test_columns_that_are_asked_for_are_not_cells_of_a_wide_table(tmp_path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("case,q1,q2,q3\na,1,2,3\nb,2,3,4\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"no column 'id'; its columns are case, q1, q2, q3$"):
+    with pytest.raises(InputError, match=r"no column 'id'; its columns are case, q1, q2, q3 \("):
         read_text_table(path, ["q1", "q2", "q3", "id"])
     with pytest.raises(InputError, match="the table looks wide"):
         read_text_table(path, ["id", "score"])
