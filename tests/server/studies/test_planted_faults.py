@@ -323,7 +323,7 @@ FAULTS: dict[str, Fault] = {
     ),
 }
 LEAST_FAULTS = 30
-WAITS_S = 20.0
+WAITS_S = 90.0
 
 
 def made_ready(

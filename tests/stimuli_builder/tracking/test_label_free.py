@@ -337,7 +337,7 @@ def test_a_whole_face_is_refused_as_a_close_up_and_a_close_up_is_not(detector, s
     monkeypatch.setattr("stimuli_builder.tracking.survey.LOOKED_AT", 12)
     folder = shared_data / "face_video"
     with pytest.raises(
-        InputError, match=r"a whole face is seen on (\d) of \1 frames .* leave it out"
+        InputError, match=r"a whole face was detected in (\d) of \1 frames, .* remove --one-eye"
     ) as refused:
         survey(scan_video(folder / "single_face.mp4"), one_eye=True)
     assert "\n" not in str(refused.value)
