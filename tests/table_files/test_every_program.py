@@ -188,7 +188,7 @@ def test_other_encodings_than_unicode_are_said_with_a_word(command, tmp_path) ->
     _, by_stimuli = said_by_all(command, tmp_path / "t.csv")[1]
     assert "t.csv: read as Windows-1252, since it is not UTF-8 (e.g. 'Lidöffnung')" in by_stimuli
     page = next((tmp_path / "report").glob("*.md")).read_text(encoding="utf-8")
-    assert "read as Windows-1252, since it is not UTF-8 (e.g. 'Lidöffnung')" in page
+    assert "Read as Windows-1252, since it is not UTF-8 (e.g. 'Lidöffnung')" in page
 
 
 def test_a_damaged_byte_does_not_make_other_letters_of_the_rest(tmp_path) -> None:

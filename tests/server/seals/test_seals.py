@@ -128,7 +128,7 @@ def test_a_report_lists_each_deviation_from_the_seal(sealed_exp3: Path, tmp_path
     result = CliRunner().invoke(analysis, [*arguments, "--out", str(tmp_path / "out")])
     assert result.exit_code == 0, result.output
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    assert "deviation from the plan sealed" in report
+    assert "Deviation from the plan sealed" in report
     assert f"{experiment.participants} participants were planned, 8 are analyzed" in report
 
 
