@@ -23,3 +23,32 @@ var Scorer = {
   term: 5,
   partialTerm: 2,
 };
+
+// Sphinx lists only pages that have every word. Where none has, pages with some of the words are better than
+// nothing: those with most of them first. Sphinx loads its own script before this one, and searches after both.
+if (typeof Search !== "undefined") {
+  const withAllWords = Search._performSearch;
+  Search._performSearch = (query, words, ...rest) => {
+    const found = withAllWords(query, words, ...rest);
+    if (found.length > 0 || words.size < 2) return found;
+    const best = new Map();
+    for (const word of words) {
+      const seen = new Set();
+      for (const result of withAllWords(word, new Set([word]), ...rest)) {
+        const [docname, , , , score] = result;
+        if (seen.has(docname)) continue;
+        seen.add(docname);
+        const kept = best.get(docname) ?? { result, hits: 0, score: 0 };
+        best.set(docname, {
+          result: kept.result,
+          hits: kept.hits + 1,
+          score: kept.score + score,
+        });
+      }
+    }
+    // Sphinx shows the last one first.
+    return [...best.values()]
+      .sort((one, other) => one.hits - other.hits || one.score - other.score)
+      .map(({ result }) => result);
+  };
+}

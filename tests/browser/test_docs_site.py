@@ -47,6 +47,9 @@ TASKS = {
     "password reset": "accounts",
     "upgrade": "update",
     "docker": "deploy",
+    # No page has all of these words: those with most of them are listed.
+    "correct a typo in a running study": "change-a-running-study",
+    "nightly backup cron gzip": "back-up-and-restore",
 }
 """Words that a newcomer searches for, and the guide that answers."""
 SHOWN_FIRST = 5
