@@ -69,6 +69,7 @@ def write_inputs(folder: Path) -> None:
     )
     (folder / "flag.csv").write_text("time_s,flag\n5,1\n9.5,0\n")
     (folder / "gaze.csv").write_text("time_s,right_deg,up_deg\n0,0,0\n4.9,0,0\n5,30,0\n12,30,-20\n")
+    (folder / "onsets.csv").write_text("time_s\n2.5\n8\n14.2\n")
     (folder / "lids.toml").write_text(LIDS)
     manuscript = Document()
     manuscript.add_paragraph(
