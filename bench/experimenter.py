@@ -312,8 +312,8 @@ def monitor(folder: Path) -> None:
     process = filled(folder, RUNS).start()
     try:
         owner = Owner(process)
-        first, _ = owner.time_of(f"{STUDY}/monitor")
-        later = [owner.time_of(f"{STUDY}/monitor")[0] for _ in range(20)]
+        first, _ = owner.time_of(f"{STUDY}/monitor?origin=simulated")
+        later = [owner.time_of(f"{STUDY}/monitor?origin=simulated")[0] for _ in range(20)]
         print_line(f"monitor, {RUNS} runs x {TRIALS} trials: first answer", f"{1000 * first:.0f} ms")
         print_line("every later one, median of 20", f"{1000 * statistics.median(later):.0f} ms", "< 200 ms")
         page(process)
@@ -333,6 +333,8 @@ def page(process: ServerProcess) -> None:
         shown.get_by_role("button", name="Create account").click()
         shown.get_by_role("heading", name="Studies").wait_for()
         shown.goto(f"{process.address}/admin/studies/short/monitor")
+        # The database is filled with simulated runs; the page begins with those of participants.
+        shown.get_by_text("Simulated", exact=True).click()
         shown.locator("canvas").nth(RUNS - 1).wait_for(timeout=60_000)
         work = shown.context.new_cdp_session(shown)
         work.send("Performance.enable")
