@@ -59,6 +59,11 @@ class Findings:
     pairs: tuple[PairCount, ...]
 
 
+def plain_reason(reason: str, source: str) -> str:
+    """Why a model was not fitted, without the file and the options of a command, which a report has not."""
+    return reason.removeprefix(f"{source}: ").partition("; use --")[0].partition("; add --")[0]
+
+
 def findings_of(comparisons: Comparisons, factors: ItemFactors | None) -> Findings:
     """Fit what the comparisons allow: Davidson where there are ties, else Bradley-Terry.
 

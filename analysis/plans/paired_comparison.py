@@ -11,7 +11,7 @@ from scipy import stats
 
 from analysis.pairs.abilities import ItemFactors, fit_abilities
 from analysis.pairs.comparisons import LEFT, RIGHT, TIE, Comparisons
-from analysis.pairs.findings import LikelihoodRatio, findings_of
+from analysis.pairs.findings import LikelihoodRatio, findings_of, plain_reason
 from analysis.pairs.likelihood import Method
 from analysis.plans.plan import Plan, PlanRows, refuse_unknown
 from analysis.plans.result import labels_of
@@ -141,13 +141,15 @@ def analyse(prepared: PlanRows) -> Contents:
     apart = scene_factors(prepared.experiment)
     merged = over_scenes(prepared, apart)
     if len(groups(prepared.experiment)) > 1:
-        return contents_of_groups(merged, analyse)
+        return _within_scenes(contents_of_groups(merged, analyse), prepared, apart)
     from analysis.report.pairs_contents import contents_of
 
     comparisons = comparisons_of(merged)
     factors = factors_of(merged.experiment, comparisons.items)
     contents = contents_of(merged, comparisons, findings_of(comparisons, factors), factors)
-    return _with_agreement_of_scenes(contents, prepared, apart) if apart else contents
+    if apart:
+        contents = _with_agreement_of_scenes(contents, prepared, apart)
+    return _within_scenes(contents, prepared, apart)
 
 
 PLAN = Plan(READING, check, analyse, number_answers)
@@ -186,9 +188,25 @@ def over_scenes(prepared: PlanRows, apart: Sequence[str]) -> PlanRows:
     )
 
 
+def _within_scenes(contents: Contents, prepared: PlanRows, apart: Sequence[str]) -> Contents:
+    """The report, with what its abilities are common to."""
+    if not apart:
+        return contents
+    return replace(
+        contents,
+        methods=COMMON.format(what=_named(prepared, apart)) + contents.methods,
+        numbers=contents.numbers | {"within": list(apart)},
+    )
+
+
+def _named(prepared: PlanRows, factors: Sequence[str]) -> str:
+    labels = labels_of(prepared.experiment)
+    return " and ".join(labels.factor(name) for name in factors)
+
+
 def _with_agreement_of_scenes(contents: Contents, prepared: PlanRows, apart: Sequence[str]) -> Contents:
     """The report with a test that all scenes have the same abilities."""
-    experiment, labels = prepared.experiment, labels_of(prepared.experiment)
+    experiment = prepared.experiment
     at = [index for index, factor in enumerate(experiment.factors) if factor.name in apart]
     scene = prepared.rows["left_cell"].astype(str).map(lambda cell: [cell.split("/")[index] for index in at])
     every = [
@@ -197,26 +215,19 @@ def _with_agreement_of_scenes(contents: Contents, prepared: PlanRows, apart: Seq
     ]
     kept = [index for index in range(len(experiment.factors)) if index not in at]
     test, reason = _tested_agreement([_without(one, kept) for one in every], "scenes")
-    what = " and ".join(labels.factor(name) for name in apart)
-    numbers = {
-        "within": list(apart),
-        "agreement": None if test is None else {"chi2": test.chi2, "df": test.df, "p": test.p},
-        "agreement_reason": reason,
-    }
+    what = f"levels of {_named(prepared, apart)}"
     return replace(
         contents,
-        parts=(
-            *contents.parts,
-            _agreement_part(test, reason, contents.name, prepared.synthetic, f"levels of {what}"),
-        ),
-        methods=SCENES.format(what=what) + contents.methods,
-        numbers=contents.numbers | numbers,
+        parts=(*contents.parts, _agreement_part(test, reason, contents.name, prepared.synthetic, what)),
+        methods=AGREEMENT + contents.methods,
+        numbers=contents.numbers | _agreement_numbers(test, reason),
     )
 
 
-SCENES = (
-    "Clips were compared only within the same level of {what}. Abilities are common to all levels, and their "
-    "agreement is tested by a likelihood ratio: separate abilities in each level against common abilities. "
+COMMON = "Clips were compared only within the same level of {what}. Abilities are common to all levels. "
+AGREEMENT = (
+    "Agreement of these levels is tested by a likelihood ratio: separate abilities in each level against "
+    "common abilities. "
 )
 
 
@@ -314,8 +325,7 @@ def _tested_agreement(named: Sequence[Comparisons], what: str) -> tuple[Likeliho
         own = [fit_abilities(one, method) for one in named]
         same = fit_abilities(pooled, method)
     except InputError as error:
-        # Without the options of a command, which a report has not.
-        return None, str(error).removeprefix(f"{pooled.source}: ").partition("; add --")[0]
+        return None, plain_reason(str(error), pooled.source)
     # Rounding may put the sum just below the common fit.
     chi2 = max(0.0, 2 * (sum(one.log_likelihood for one in own) - same.log_likelihood))
     df = (len(named) - 1) * (len(pooled.items) - 1 + (method == "davidson"))
@@ -367,7 +377,13 @@ def _numbers(
     return {
         **study_data(prepared, people),
         "groups": [{"group": name, **contents.numbers} for name, contents in of_groups],
+        **_agreement_numbers(test, reason),
+        "exclusions": exclusions_data(prepared.exclusions),
+    }
+
+
+def _agreement_numbers(test: LikelihoodRatio | None, reason: str | None) -> dict[str, Any]:
+    return {
         "agreement": None if test is None else {"chi2": test.chi2, "df": test.df, "p": test.p},
         "agreement_reason": reason,
-        "exclusions": exclusions_data(prepared.exclusions),
     }

@@ -7,7 +7,7 @@ from typing import Any
 
 from analysis.pairs.abilities import FactorTest, ItemFactors, PairsResult
 from analysis.pairs.comparisons import Comparisons, separated_items
-from analysis.pairs.findings import Findings
+from analysis.pairs.findings import Findings, plain_reason
 from analysis.plans.plan import PlanRows
 from analysis.plans.result import Labels, labels_of
 from analysis.report.choice_tables import abilities_table, contrasts_table, factors_table
@@ -152,7 +152,7 @@ def _reason(reason: str | None, comparisons: Comparisons, items: Mapping[str, st
     if separated is not None and "--firth" in reason:
         model = "Davidson" if comparisons.ties else "Bradley-Terry"
         return f"The {model} model {NO_MAXIMUM}, because {separated}"
-    return reason.removeprefix(f"{comparisons.source}: ").partition("; use --")[0].partition("; add --")[0]
+    return plain_reason(reason, comparisons.source)
 
 
 def item_labels(experiment: Experiment, items: tuple[str, ...]) -> dict[str, str]:

@@ -15,6 +15,7 @@ from analysis.plans.plan import study_contents
 from analysis.read.pool import Origin, Pool
 from analysis.read.study_answers import load_csv
 from experiments import rules
+from experiments.declaration.factors import Factor, Level
 from experiments.declaration.paired_comparison import WithinFactor
 from experiments.errors import InputError
 from experiments.load import load_experiment
@@ -380,3 +381,23 @@ def test_a_scene_whose_abilities_cannot_be_fitted_is_named_and_the_rest_is_repor
     assert found.numbers["agreement"] is None
     said = "textbook lost every comparison with the others, so no finite ability fits"
     assert found.numbers["agreement_reason"] == said
+
+
+def test_groups_whose_pairs_are_within_scenes_say_so(tmp_path) -> None:
+    scene = Factor(
+        name="scene", label="Scene", levels=(Level(name="a", label="A"), Level(name="b", label="B"))
+    )
+    trial = GROUPED.trial.model_copy(update={"pairs": WithinFactor(factor="blink")})
+    experiment = GROUPED.model_copy(update={"factors": (*GROUPED.factors, scene), "trial": trial})
+    abilities = {f"{cell}/{level}": ability for cell, ability in ABILITIES.items() for level in "ab"}
+    rows = [
+        row
+        for row in compare(experiment, abilities, 60)
+        if row["left_cell"].split("/")[2] == row["right_cell"].split("/")[2]
+    ]
+    found = report(tmp_path, rows, experiment)
+    assert found.numbers["within"] == ["scene"]
+    assert found.methods.startswith("Clips were compared only within the same level of Scene. ")
+    for group in found.numbers["groups"]:
+        assert [item["name"].split("/")[1] for item in group["abilities"]["items"]] == ["model", "textbook"]
+    assert found.numbers["agreement"]["df"] == 1
