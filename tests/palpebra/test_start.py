@@ -13,9 +13,8 @@ import pytest
 
 from experiments.errors import InputError
 from palpebra import cli
-from palpebra.cli import with_start
+from palpebra.cli import damaged_files, refuse_broken_installation, with_start
 from palpebra.folders import data_folder, free_port
-from palpebra.intact import damaged_files, refuse_broken_installation
 from palpebra.start import only_server_of
 from server.core.settings import Settings
 from tests.helpers.ports import free_port as unused_port
