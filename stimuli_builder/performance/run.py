@@ -1,6 +1,7 @@
 """The command `stimuli performance`: speech in, lid curves out."""
 
 import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
@@ -305,12 +306,8 @@ def read_flag(path: Path, duration_s: float) -> list[Hold]:
             f"{path}: expected the columns time_s and flag, or start_s and end_s, got "
             f"{', '.join(table.header)}"
         )
-    names = ("start_s", "end_s") if spans else ("time_s",)
     rows = [row for _, row in table.rows]
-    try:
-        times = np.array([[float(row[name]) for name in names] for row in rows])
-    except ValueError as error:
-        raise InputError(f"{path}: expected seconds: {error}") from error
+    times = _numbers(path, rows, ("start_s", "end_s") if spans else ("time_s",), "seconds")
     if not rows:
         raise InputError(f"{path}: expected one row or more under the header, got none")
     # NaN is in no range. A track of flags may go on after the end, and a span may begin before the start.
@@ -335,6 +332,16 @@ def read_flag(path: Path, duration_s: float) -> list[Hold]:
         for start, end in zip(starts, ends, strict=True)
         if start < duration_s and end > 0
     )
+
+
+def _numbers(
+    path: Path, rows: Sequence[Mapping[str, str]], names: Sequence[str], what: str
+) -> NDArray[np.float64]:
+    """Columns of a table (rows, names)."""
+    try:
+        return np.array([[float(row[name]) for name in names] for row in rows])
+    except ValueError as error:
+        raise InputError(f"{path}: expected {what}: {error}") from error
 
 
 # Where the eyes look: lids follow the gaze, and blinks come with large shifts of it.
@@ -368,10 +375,7 @@ def read_gaze(path: Path, duration_s: float) -> GazeTrack:
         raise InputError(
             f"{path}: expected the columns time_s, right_deg and up_deg, got {', '.join(table.header)}"
         )
-    try:
-        values = np.array([[float(row[name]) for name in ("time_s", *given)] for _, row in table.rows])
-    except ValueError as error:
-        raise InputError(f"{path}: expected numbers: {error}") from error
+    values = _numbers(path, [row for _, row in table.rows], ("time_s", *given), "numbers")
     # Finite before rising: a comparison with NaN is false, too.
     if not len(values) or not np.isfinite(values).all() or not (np.diff(values[:, 0]) > 0).all():
         raise InputError(f"{path}: expected rising times and finite angles in every row")
