@@ -170,16 +170,19 @@ def _levels_told_apart(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Levels that raters can recognize by something other than the factor."""
     manifest = Manifest.model_validate(launch.version.manifest)
     for sentence in reported_leaks(manifest.clips):
-        text = f"{sentence[:1].upper()}{sentence[1:]}."
-        yield LaunchCheck(kind="levels_told_apart", blocks=False, text=text, page="clips")
+        yield LaunchCheck(kind="levels_told_apart", blocks=False, text=_as_sentence(sentence), page="clips")
 
 
 def _doubtful_trial(launch: LaunchState) -> Iterator[LaunchCheck]:
     """A declared trial that is possible but most likely a mistake."""
     if doubt := KINDS[launch.experiment.trial.kind].doubt(launch.experiment):
         path, _, said = doubt.partition(": ")
-        text = f"{said[:1].upper()}{said[1:]}."
+        text = _as_sentence(said)
         yield LaunchCheck(kind="doubtful_trial", blocks=False, text=text, page="build", path=path)
+
+
+def _as_sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _translations(launch: LaunchState) -> Iterator[LaunchCheck]:
