@@ -134,7 +134,7 @@ function ConsentMenu({ language }: { language: string }) {
   const { data, design } = builder;
   const known = {
     title: textAt(data, ["participant_title", language]) || textAt(data, ["title"]),
-    minutes: design === null ? "" : String(Math.max(1, Math.round(design.expected_minutes))),
+    minutes: design === null ? "" : String(Math.max(1, Math.ceil(design.expected_minutes))),
   };
   const marks = unfilledMarks(textAt(data, ["texts", language, "consent"]));
   return (
