@@ -68,12 +68,14 @@ format: setup-test ## rewrite Python and TypeScript in the house format
 RESOLVE = $(BIN)/uv pip compile -q --upgrade --universal --generate-hashes --no-header --no-annotate --python-version 3.11 pyproject.toml
 # A checkout and the image have all that needs no account elsewhere.
 RUN_EXTRAS = --extra track --extra render --extra deploy --extra parquet
-lock: ## resolve the Python dependencies again, with hashes: what runs, what tests and servers add
+lock: ## resolve the Python dependencies again, with hashes: what runs, what docs, tests and servers add
 	@mkdir -p build
 	@$(RESOLVE) --all-extras --group dev -o build/all.lock
 	@$(RESOLVE) -c build/all.lock $(RUN_EXTRAS) -o requirements.lock
 	@$(RESOLVE) -c build/all.lock $(RUN_EXTRAS) --extra s3 -o build/server.lock
+	@$(RESOLVE) -c build/all.lock $(RUN_EXTRAS) --group docs -o build/docs.lock
 	@$(BIN)/python tools/split_locks.py build/all.lock requirements.lock requirements-dev.lock
+	@$(BIN)/python tools/split_locks.py build/docs.lock requirements.lock requirements-docs.lock
 	@$(BIN)/python tools/split_locks.py build/server.lock requirements.lock deploy/s3.lock
 	@$(BIN)/python tools/check_lock_files.py
 

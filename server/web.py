@@ -179,9 +179,11 @@ def asset(settings: SettingsDep, site: str, name: str) -> Response:
 DOCS_NOT_BUILT = """<!doctype html>
 <html lang="en">
 <title>Documentation</title>
-<h1>The documentation is not built here</h1>
-<p><code>make run</code> does not build it. Type <code>make docs</code> in the checkout (a minute or two),
-then load this page again. You can also read the files in its folder <code>docs</code>.</p>
+<meta http-equiv="refresh" content="10">
+<h1>The documentation is not ready</h1>
+<p>After <code>make run</code> it is built in the background. This page looks for it every ten seconds.
+If it does not appear within two minutes, type <code>make docs</code> in the checkout to see why.
+You can also read the files in its folder <code>docs</code>.</p>
 </html>
 """
 

@@ -32,7 +32,7 @@ def main() -> int:
                 problems.append(
                     f"{name}:{number}: names a registry's host or a machine's path: {line.strip()[:90]}"
                 )
-    for lock in ("requirements.lock", "requirements-dev.lock", "deploy/s3.lock"):
+    for lock in ("requirements.lock", "requirements-docs.lock", "requirements-dev.lock", "deploy/s3.lock"):
         if "--hash=sha256:" not in (ROOT / lock).read_text():
             problems.append(f"{lock}: has no hashes; run `make lock`")
     print("\n".join(problems) if problems else "lock files and host names: clean")

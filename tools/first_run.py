@@ -1,4 +1,4 @@
-"""`make run`: clips, database, the three studies and the server; then prints where to go.
+"""`make run`: clips, documentation, database, the three studies and the server; then prints where to go.
 
 Every step is skipped where nothing has changed, so that a later run starts in seconds.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -78,8 +79,24 @@ def draw_strips(stamp_text: str) -> None:
     stamp.write_text(stamp_text)
 
 
+def build_docs_meanwhile() -> None:
+    """Build the documentation site in the background, at low priority: what it says goes to a file.
+
+    The first run renders clips for longer than this takes. A later run does not wait for it, so the server
+    shows the old site, or a page that says what is missing, for half a minute.
+    """
+    log = ROOT / "build" / "docs.log"
+    log.parent.mkdir(exist_ok=True)
+    slowly = ["nice", "-n", "10"] if shutil.which("nice") else []
+    with log.open("w", encoding="utf-8") as file:
+        subprocess.Popen(
+            [*slowly, BIN / "python", "tools/setup.py", "docs"], cwd=ROOT, stdout=file, stderr=file
+        )
+
+
 def main() -> None:
     DATA.mkdir(parents=True, exist_ok=True)
+    build_docs_meanwhile()
     port = os.environ.get("PORT", "8000")
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
     os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")  # links name it before the start

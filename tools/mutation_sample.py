@@ -20,8 +20,9 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -127,7 +128,7 @@ def tests_of(site: Site, tree: Path) -> list[str]:
 def outcome(site: Site, tree: Path) -> str:
     """`killed`, `survived`, or `untested` where no test imports the module or its tests fail anyway."""
     tests = tests_of(site, tree)
-    if not tests or not _passes(tests, tree):
+    if not tests or not _passes_unchanged(tuple(tests), tree):
         return "untested"
     original = site.file.read_text(encoding="utf-8")
     try:
@@ -137,7 +138,13 @@ def outcome(site: Site, tree: Path) -> str:
         site.file.write_text(original, encoding="utf-8")
 
 
-def _passes(tests: list[str], tree: Path) -> bool:
+@cache
+def _passes_unchanged(tests: tuple[str, ...], tree: Path) -> bool:
+    """Whether the tests pass without a change: sites of one module ask it once."""
+    return _passes(tests, tree)
+
+
+def _passes(tests: Sequence[str], tree: Path) -> bool:
     short = ["-m", "not long"] if (tree / "tests" / "tiers.toml").is_file() else []
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", *short, *tests]
     try:

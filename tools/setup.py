@@ -3,8 +3,9 @@
 Only the standard library, because it runs before anything is installed. Each step leaves a stamp holding the
 hash of what it was made from, so that a later run repeats only what has changed.
 
-    python3 tools/setup.py run      what `make run` needs
-    python3 tools/setup.py test     what `make test` needs too: test and npm packages, Chromium, Firefox, Xvfb
+    python3 tools/setup.py run      what `make run` needs before it starts
+    python3 tools/setup.py docs     the documentation site, which `make run` builds while clips are rendered
+    python3 tools/setup.py test     both and what `make test` needs: test packages, Chromium, Firefox, Xvfb
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ VENV = ROOT / ".venv"
 BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 STAMPS = VENV / "stamps"
 FRONTEND = ROOT / "frontend"
-RUN_LOCK, TEST_LOCK = ROOT / "requirements.lock", ROOT / "requirements-dev.lock"
+RUN_LOCK, DOCS_LOCK, TEST_LOCK = (ROOT / f"requirements{name}.lock" for name in ("", "-docs", "-dev"))
 MINIMUM_NODE = 20
 # What the three programs import when they do their work, and what every figure and report needs.
 STARTED = (
@@ -159,12 +160,19 @@ def build_pages() -> None:
 
 def build_docs() -> None:
     say("building the documentation site")
-    shutil.rmtree(FRONTEND / "dist" / "docs", ignore_errors=True)
-    target, trees = FRONTEND / "dist" / "docs", ROOT / "build" / "doctrees"
+    # Another folder until it is whole: a server may be showing the old site.
+    target, trees = FRONTEND / "dist" / "docs.new", ROOT / "build" / "doctrees"
+    shutil.rmtree(target, ignore_errors=True)
     quiet = ("-q", "-W", "--keep-going", "-b", "html", "-d", trees)
     call(BIN / "python", "-m", "sphinx", *quiet, ROOT / "docs", target)
     for source_map in target.rglob("*.map"):  # the theme's, for its developers: 2 MB
         source_map.unlink()
+    shutil.rmtree(FRONTEND / "dist" / "docs", ignore_errors=True)
+    target.rename(FRONTEND / "dist" / "docs")
+
+
+def prepare_docs() -> None:
+    step("docs", docs_sources(), build_docs, FRONTEND / "dist" / "docs" / "index.html")
 
 
 def docs_sources() -> list[Path]:
@@ -219,12 +227,16 @@ def provide_test_programs() -> None:
 
 def main() -> None:
     purpose = sys.argv[1] if len(sys.argv) > 1 else "run"
+    if purpose == "docs":
+        prepare_docs()
+        return
     if sys.version_info < (3, 11):  # noqa: UP036 - this script runs before anything has checked
         fail(f"Python 3.11 or newer is needed, this is {sys.version.split()[0]}")
     make_environment()
     # Once the test packages are in, `run` keeps them.
     with_tests = purpose == "test" or (STAMPS / "python-test").is_file()
-    name, locks = ("python-test", [RUN_LOCK, TEST_LOCK]) if with_tests else ("python", [RUN_LOCK])
+    # The test packages include those of the documentation.
+    name, locks = ("python-test", [RUN_LOCK, TEST_LOCK]) if with_tests else ("python", [RUN_LOCK, DOCS_LOCK])
     inputs = [*locks, ROOT / "pyproject.toml", *(ROOT / name / "pyproject.toml" for name in WORKSPACE)]
     step(name, inputs, lambda: install_python([lock.name for lock in locks]), BIN / "server")
     step("bytecode", inputs, keep_bytecode)
@@ -238,9 +250,8 @@ def main() -> None:
         FRONTEND / "dist" / "admin",
         FRONTEND / "dist" / "participant",
     )
-    if with_tests:  # Sphinx is a test package: `make run` alone serves no documentation site
-        step("docs", docs_sources(), build_docs, FRONTEND / "dist" / "docs" / "index.html")
     if purpose == "test":
+        prepare_docs()
         provide_test_programs()
 
 
