@@ -53,7 +53,11 @@ def compared_by(differences: "Sequence[Difference]") -> str:
     paired = [one.paired for one in differences]
     tests = ["within people by paired t tests"] * any(paired)
     tests += ["between groups by Welch's t tests"] * (not all(paired))
-    return f"Series are compared {' and '.join(tests)}, Holm-corrected. " if tests else ""
+    if not tests:
+        return ""
+    twice = [counted(one.left_out, "participant") for one in differences if one.left_out]
+    without = f", without {' and '.join(dict.fromkeys(twice))} who took part in both groups" if twice else ""
+    return f"Series are compared {' and '.join(tests)}{without}, Holm-corrected. "
 
 
 def contents_of(

@@ -35,7 +35,9 @@ class SeriesFit:
 class Difference:
     """An estimate of two series compared; p corrected by Holm over all pairs of series.
 
-    Within people by a paired t test; between groups of people by Welch's.
+    Within people by a paired t test where at least half of the smaller series' people have both; else between
+    groups of people by Welch's, without the `left_out` people who have both: their estimates are not
+    independent.
     """
 
     first: str
@@ -49,6 +51,7 @@ class Difference:
     p: float
     p_holm: float
     paired: bool
+    left_out: int
     what: str = "threshold"
 
 
@@ -58,7 +61,7 @@ def differences(
     """The estimates by person of every two series compared, in pairs where the same people have both."""
     made = [row for one, other in combinations(series, 2) if (row := _compared(one, other)) is not None]
     corrected = holm(np.array([row[-1] for _, row in made])).tolist() if made else []
-    return tuple(Difference(*row, p, paired, what) for (paired, row), p in zip(made, corrected, strict=True))
+    return tuple(Difference(*row, p, *how, what) for (how, row), p in zip(made, corrected, strict=True))
 
 
 _Row = tuple[str, str, int, float, float, float, float, float, float]
@@ -66,11 +69,15 @@ _Row = tuple[str, str, int, float, float, float, float, float, float]
 
 def _compared(
     one: tuple[str, Mapping[str, float]], other: tuple[str, Mapping[str, float]]
-) -> tuple[bool, _Row] | None:
-    """Whether in pairs; labels, people, difference with its interval, t, df and p. None of too few people."""
+) -> tuple[tuple[bool, int], _Row] | None:
+    """Whether in pairs and people left out; labels, people, difference with its interval, t, df and p.
+
+    None where too few people have an estimate.
+    """
     (label, first), (other_label, second) = one, other
     both = sorted(first.keys() & second.keys())
-    if both:
+    paired = 2 * len(both) >= max(min(len(first), len(second)), 1)
+    if paired:
         gaps = np.array([first[name] - second[name] for name in both])
         # Without variance the t test would divide by zero.
         if len(both) < 2 or not np.ptp(gaps) > 0:
@@ -78,14 +85,14 @@ def _compared(
         test: Any = stats.ttest_1samp(gaps, 0.0)
         people, difference = len(both), float(gaps.mean())
     else:
-        a, b = np.array(list(first.values())), np.array(list(second.values()))
+        a, b = (np.array([one[name] for name in one if name not in both]) for one in (first, second))
         if min(a.size, b.size) < 2 or not np.ptp(a) + np.ptp(b) > 0:
             return None
         test = stats.ttest_ind(a, b, equal_var=False)
         people, difference = a.size + b.size, float(a.mean() - b.mean())
     low, high = test.confidence_interval(0.95)
     numbers = (difference, float(low), float(high), float(test.statistic), float(test.df))
-    return bool(both), (label, other_label, people, *numbers, float(test.pvalue))
+    return (paired, 0 if paired else len(both)), (label, other_label, people, *numbers, float(test.pvalue))
 
 
 # The answers of a threshold study, by series.

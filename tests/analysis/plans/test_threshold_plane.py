@@ -3,6 +3,7 @@
 import csv
 import random
 import re
+from dataclasses import replace
 from pathlib import Path
 from statistics import NormalDist
 
@@ -164,6 +165,14 @@ def test_groups_whose_welch_df_are_whole_by_chance_are_not_called_paired() -> No
     assert compared_by(between) == "Series are compared between groups by Welch's t tests, Holm-corrected. "
     within = differences([("s1", first), ("s2", dict(zip("abc", (2.0, 3.5, 4.0), strict=True)))])
     assert compared_by(within) == "Series are compared within people by paired t tests, Holm-corrected. "
+
+
+def test_a_person_in_both_of_two_groups_is_left_out_of_their_comparison() -> None:
+    first, second = {f"a{i}": float(i) for i in range(6)}, {f"b{i}": float(i * i) for i in range(6)}
+    apart = differences([("s1", first), ("s2", second)])
+    shared = differences([("s1", first | {"x": 40.0}), ("s2", second | {"x": -3.0})])
+    assert shared == (replace(apart[0], left_out=1),)
+    assert "without 1 participant who took part in both groups" in compared_by(shared)
 
 
 GROUPS = {True: ({"s1", "s2"},), False: ({"s1", "s2"}, {"s3", "s4"}, {"s1", "s4"})}
