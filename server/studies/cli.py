@@ -121,7 +121,18 @@ def _of_new_clips(
     if not (new if is_live else open_):
         return []
     shown: list[Clip | CheckClip] = [*manifest.clips, *manifest.checks]
-    return clip_findings(*services.stored_clips.find_faults(shown, CLIPS_WITHIN_S))
+    return examined_clips(services, shown)
+
+
+def examined_clips(services: Services, clips: Sequence[Clip | CheckClip]) -> list[LaunchCheck]:
+    """What is wrong with clips. A command waits as long as it takes, unless a whole round gets nowhere."""
+    faults, left = services.stored_clips.find_faults(clips, CLIPS_WITHIN_S)
+    before = len(clips)
+    while 0 < left < before:
+        out.print(f"examining clips: {left} of {len(clips)} left")
+        before = left
+        faults, left = services.stored_clips.find_faults(clips, CLIPS_WITHIN_S)
+    return clip_findings(faults, left)
 
 
 def _same_version(session: Session, study: Study, sha256: str, manifest: Manifest) -> StudyVersion | None:
@@ -178,7 +189,7 @@ def set_status(
         if status == "live":
             with services.database.read() as session:
                 clips = clips_shown(session, find_study(session, study, OPERATOR, "view"))
-            of_clips = clip_findings(*services.stored_clips.find_faults(clips, CLIPS_WITHIN_S))
+            of_clips = examined_clips(services, clips)
         with services.database.write() as session:
             known = find_study(session, study, OPERATOR, "view")
             _set_status(session, known, status, of_clips, anyway=anyway)

@@ -20,6 +20,7 @@ from server.models import Study, StudyVersion
 from server.operations.doctor import Finding
 from server.rehearsals.service import of_finding
 from server.studies import creation
+from server.studies.cli import examined_clips
 from server.studies.creation import store_clips
 from server.transcoding.preparing import StoredClips
 from tests.helpers.admins import Admin
@@ -271,6 +272,19 @@ def test_the_command_opens_it_anyway_and_a_clip_brought_back_is_fine(
     assert "1 clip is missing on the server" in opened_anyway.stdout.replace("\n", " ")
     [entry, *_] = [one for one in owner.get("/audit").json() if one["action"] == "status changed"]
     assert entry["details"]["anyway"] == "clip_missing"
+
+
+@pytest.mark.parametrize(("rounds", "left"), [([70, 6, 0], 0), ([70, 70, 0], 70)], ids=["slow", "stuck"])
+def test_a_command_waits_for_clips_as_long_as_more_of_them_are_examined(
+    services: Services, monkeypatch: pytest.MonkeyPatch, rounds: list[int], left: int
+) -> None:
+    """A computer that needs more than a minute for the clips of a study can open it, too."""
+    answers = iter(rounds)
+    monkeypatch.setattr(services.stored_clips, "find_faults", lambda clips, within_s: ([], next(answers)))
+    found = examined_clips(services, [object()] * 80)  # type: ignore[list-item]
+    assert [one.text for one in found] == (
+        [f"The server has not yet examined {left} clips. Try again in a minute."] if left else []
+    )
 
 
 def test_anyway_does_not_open_a_study_with_placeholders(
