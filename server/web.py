@@ -188,6 +188,16 @@ You can also read the files in its folder <code>docs</code>.</p>
 """
 
 
+NO_SUCH_PAGE = """<!doctype html>
+<html lang="en">
+<title>Page not found</title>
+<h1>The documentation has no such page</h1>
+<p>Look it up in <a href="/docs/how-to/index.html">How do I ...?</a>, which lists all questions, use the
+<a href="/docs/search.html">search</a>, or begin at the <a href="/docs/">first page</a>.</p>
+</html>
+"""
+
+
 @page_router.get("/docs")
 def docs_home() -> RedirectResponse:
     """Pages of the documentation link one another relative to /docs/."""
@@ -202,7 +212,7 @@ def documentation(settings: SettingsDep, name: str) -> Response:
         return HTMLResponse(DOCS_NOT_BUILT, status_code=503)
     path = _file_within(folder, folder / name) or _file_within(folder, folder / name / "index.html")
     if path is None:
-        raise NotFound(f"There is no page {name[:200]} in the documentation.")
+        return HTMLResponse(NO_SUCH_PAGE, status_code=404)
     kind = mimetypes.guess_type(path.name)[0] or "application/octet-stream"
     content = _read(path, path.stat().st_mtime_ns)
     return Response(content, media_type=kind, headers={"cache-control": "no-cache"})

@@ -28,9 +28,7 @@ var Scorer = {
 // nothing: those with most of them first. Sphinx loads its own script before this one, and searches after both.
 if (typeof Search !== "undefined") {
   const withAllWords = Search._performSearch;
-  Search._performSearch = (query, words, ...rest) => {
-    const found = withAllWords(query, words, ...rest);
-    if (found.length > 0 || words.size < 2) return found;
+  const withSomeWords = (query, words, ...rest) => {
     const best = new Map();
     for (const word of words) {
       const seen = new Set();
@@ -50,5 +48,112 @@ if (typeof Search !== "undefined") {
     return [...best.values()]
       .sort((one, other) => one.hits - other.hits || one.score - other.score)
       .map(({ result }) => result);
+  };
+
+  // The questions of "How do I ...?" come first: each leads to the heading that answers it.
+  const INDEX = "how-to/index";
+  const SHOWN = 4;
+  let questions = [];
+
+  const stemsOf = (text) => {
+    const stemmer = new Stemmer();
+    return new Set(
+      splitQuery(text.toLowerCase()).map((word) => stemmer.stemWord(word)),
+    );
+  };
+
+  const readQuestions = async () => {
+    const root = document.documentElement.dataset.content_root;
+    const page = new URL(`${root}${INDEX}.html`, document.baseURI);
+    const text = await (await fetch(page)).text();
+    const items = new DOMParser()
+      .parseFromString(text, "text/html")
+      .querySelectorAll("article section li");
+    const base = new URL(root, document.baseURI).pathname;
+    return [...items].flatMap((item) => {
+      const link = item.querySelector("a");
+      if (link === null) return [];
+      const to = new URL(link.getAttribute("href"), page);
+      const docname = to.pathname.slice(base.length).replace(/\.html$/, "");
+      const title = link.textContent;
+      return [
+        {
+          docname,
+          anchor: to.hash,
+          title,
+          words: stemsOf(item.textContent),
+          own: stemsOf(title),
+        },
+      ];
+    });
+  };
+
+  const has = (words, word) =>
+    words.has(word) ||
+    (word.length > 3 && [...words].some((one) => one.startsWith(word)));
+
+  // A word that few questions have says more than one that many have.
+  const fittingQuestions = (words) => {
+    const weights = [...words].map((word) => {
+      const hits = questions.filter((question) =>
+        has(question.words, word),
+      ).length;
+      return [word, Math.log((questions.length + 1) / (hits + 0.5))];
+    });
+    const total = weights.reduce((sum, [, weight]) => sum + weight, 0);
+    return questions
+      .map((question) => {
+        const kept = weights.filter(([word]) => has(question.words, word));
+        const share = kept.reduce((sum, [, weight]) => sum + weight, 0) / total;
+        const inTitle = kept.filter(([word]) => has(question.own, word)).length;
+        return {
+          question,
+          score: share + 0.1 * inTitle - 0.002 * question.words.size,
+          share,
+        };
+      })
+      .filter(({ share }) => share > 0.5)
+      .sort((one, other) => other.score - one.score)
+      .slice(0, SHOWN)
+      .map(({ question, score }) => [
+        question.docname,
+        question.title,
+        question.anchor,
+        null,
+        score,
+        "",
+        "title",
+      ])
+      .reverse();
+  };
+
+  const FILLERS = new Set(
+    "how do does can could i my me we our you what which where when why who am want need".split(
+      " ",
+    ),
+  );
+
+  Search._performSearch = (query, asked, ...rest) => {
+    const telling = new Set([...asked].filter((word) => !FILLERS.has(word)));
+    const words = telling.size > 0 ? telling : asked;
+    const found = withAllWords(query, words, ...rest);
+    const pages =
+      found.length > 0 || words.size < 2
+        ? found
+        : withSomeWords(query, words, ...rest);
+    return words.size === 0 ? pages : [...pages, ...fittingQuestions(words)];
+  };
+
+  const search = Search.query;
+  Search.query = async (query) => {
+    // A site that is opened as files may not read its own pages.
+    questions = await readQuestions().catch(() => []);
+    search(query);
+    const note = document.createElement("p");
+    const link = document.createElement("a");
+    link.href = `${document.documentElement.dataset.content_root}${INDEX}.html`;
+    link.textContent = "How do I ...? lists all questions.";
+    note.append("Not found? ", link);
+    document.getElementById("search-results").append(note);
   };
 }

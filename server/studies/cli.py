@@ -51,7 +51,7 @@ from server.studies.links import (
 from server.studies.lookup import active_version, find_study, must_not_be_archived
 from server.studies.repository import links_of
 from server.studies.schemas import LaunchCheck
-from server.studies.series import content_of
+from server.studies.series import content_of, sizes_of, sizes_of_version
 
 study_app = command_group("Studies on this server.")
 link_app = command_group("Links for participants.")
@@ -142,7 +142,7 @@ def _same_version(session: Session, study: Study, sha256: str, manifest: Manifes
     version = active_version(session, study)
     known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips}
     same = version.definition_sha256 == sha256 and known == content_of(manifest.clips)
-    return version if same else None
+    return version if same and sizes_of(manifest) == sizes_of_version(version) else None
 
 
 def _urls(settings: Settings, session: Session, study: Study) -> list[tuple[str, str]]:

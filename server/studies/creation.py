@@ -49,7 +49,7 @@ from server.studies.schemas import (
     NewVersion,
     ShippedExperiment,
 )
-from server.studies.series import content_of, series_for
+from server.studies.series import content_of, series_for, sizes_of
 from server.studies.uploads import upload_folder
 from server.transcoding.preparing import StoredClips
 from server.transcoding.records import videos_of
@@ -254,7 +254,7 @@ def add_version(
         manifest=manifest.model_dump(mode="json"),
         inter_ocular_px=manifest.inter_ocular_px,
         format=FORMAT,
-        series=series_for(study, experiment, content_of(manifest.clips)),
+        series=series_for(study, experiment, content_of(manifest.clips), sizes_of(manifest)),
         note=note,
         created_by=identity.account_id if identity else None,
     )

@@ -79,17 +79,38 @@ def content_of(clips: Sequence[Clip]) -> Content:
     return {(clip.cell, clip.exemplar, clip.sha256) for clip in clips}
 
 
-def series_for(study: Study, experiment: Experiment, clips: Content) -> int:
+Sizes = dict[tuple[str, int], tuple[float | None, float | None]]
+"""Width in mm and the eyes' distance in px, by cell and exemplar: what decides a clip's size on screens."""
+
+
+def sizes_of(manifest: Manifest) -> Sizes:
+    """The sizes of a manifest's clips."""
+    eyes = manifest.inter_ocular_px
+    return {(clip.cell, clip.exemplar): (clip.width_mm, eyes) for clip in manifest.clips}
+
+
+def sizes_of_version(version: StudyVersion) -> Sizes:
+    """The sizes of a stored version's clips."""
+    eyes = version.inter_ocular_px
+    return {(clip.cell, clip.exemplar): (clip.width_mm, eyes) for clip in version.clips if clip.cell}
+
+
+def series_for(study: Study, experiment: Experiment, clips: Content, sizes: Sizes | None = None) -> int:
     """The series of a further version: the latest whose versions all measure the same by the same clips.
 
     Where there is none, a new series begins. One version is not enough: a form may be new to an older version
-    and another form than that of a newer one.
+    and another form than that of a newer one. Sizes count where participants measure their screens.
     """
+    if experiment.display.calibrate == "off":
+        sizes = None
     by_series: dict[int, list[StudyVersion]] = {}
     for version in study.versions:
         by_series.setdefault(version.series, []).append(version)
     for series in dict.fromkeys(version.series for version in reversed(study.versions)):
-        if all(_measures_the_same(version, experiment, clips) for version in reversed(by_series[series])):
+        if all(
+            _measures_the_same(version, experiment, clips) and sizes in (None, sizes_of_version(version))
+            for version in reversed(by_series[series])
+        ):
             return series
     return max(by_series, default=0) + 1
 

@@ -86,6 +86,21 @@ def test_adding_again_changes_nothing_and_a_change_makes_a_version(
         assert (session.query(Study).one().active_version, session.query(Link).count()) == (2, 1)
 
 
+def test_another_size_of_the_same_clips_makes_a_version_and_a_series(
+    settings: Settings, services: Services, sources: Path
+) -> None:
+    add(settings, sources)
+    manifest = sources / "clips" / "manifest.json"
+    told = json.loads(manifest.read_text(encoding="utf-8"))
+    told["clips"] = [clip | {"width_mm": 90} for clip in told["clips"]]
+    manifest.write_text(json.dumps(told), encoding="utf-8")
+    changed = add(settings, sources)
+    assert "version 2, 8 clips (0 new)" in changed.stdout, changed.stderr
+    assert "nothing new" in add(settings, sources).stdout
+    with services.database.read() as session:
+        assert [version.series for version in session.query(StudyVersion)] == [1, 2]
+
+
 def test_an_archived_study_is_not_changed_from_the_command_line(
     settings: Settings, services: Services, sources: Path, study: StudyInDatabase
 ) -> None:
