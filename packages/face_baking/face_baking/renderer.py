@@ -1,7 +1,9 @@
 """One Cycles process that renders poses of one face: the package's side of cycles_face_worker.py."""
 
 import json
+import signal
 import subprocess
+import sys
 import tempfile
 import tomllib
 from contextlib import suppress
@@ -82,6 +84,8 @@ class Renderer:
         self.device = ""
 
     def __enter__(self) -> "Renderer":
+        # Else a bake that is asked to end would leave Blender at work on its picture for minutes.
+        self._before = signal.signal(signal.SIGTERM, lambda number, _frame: sys.exit(128 + number))
         try:
             self.device = str(self._answer("starting")["device"])
         except BaseException as error:
@@ -92,6 +96,7 @@ class Renderer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        signal.signal(signal.SIGTERM, self._before)
         if error is not None:
             self._process.kill()
         for stream in (self._process.stdin, self._process.stdout):

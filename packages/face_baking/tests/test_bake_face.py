@@ -2,7 +2,11 @@
 
 import errno
 import json
+import multiprocessing
+import os
+import signal
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -197,6 +201,29 @@ def test_each_box_is_rendered_with_its_own_samples(scene: FaceScene, tmp_path: P
     with Renderer(scene, Setup(program(tmp_path, answer), "studio", "cpu", 1, tmp_path / "log")) as renderer:
         renderer.render(shot)
     assert json.loads((tmp_path / "job").read_text())["samples"] == {"left": 3, "left_lids": 8}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM")
+def test_a_bake_that_is_asked_to_end_ends_its_blender(scene: FaceScene, tmp_path: Path) -> None:
+    body = (
+        "import os, time\nprint(json.dumps({'device': 'CPU'}), flush=True)\nsys.stdin.readline()\n"
+        f"open({str(tmp_path / 'pid')!r}, 'w').write(str(os.getpid()))\ntime.sleep(60)"
+    )
+
+    def bake() -> None:
+        setup = Setup(program(tmp_path, body), "studio", "cpu", 1, tmp_path / "log")
+        with Renderer(scene, setup) as renderer:
+            renderer.render(Shot(tmp_path / "x.npz", LidPose(0.0), {"left": (0, 0, 2, 2)}, 1))
+
+    baking = multiprocessing.get_context("fork").Process(target=bake)
+    baking.start()
+    while baking.is_alive() and not (tmp_path / "pid").exists():
+        time.sleep(0.05)
+    baking.terminate()
+    baking.join(20)
+    assert baking.exitcode == 128 + signal.SIGTERM
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((tmp_path / "pid").read_text()), 0)
 
 
 def test_the_eyes_lie_60_mm_apart_and_the_rest_holds_still(scene: FaceScene) -> None:
