@@ -19,6 +19,9 @@ CAMERA_Z_CM = 74.0
 IRIS_COVERED_CM, IRIS_COVERED_BELOW_CM = 0.25, 0.01
 """How far the resting lids' wet edges reach over the iris; 0.7 mm less of it is seen covered (see
 docs/explanation/face-quality.md), since an iris fades into the white at its rim and a lid is thick."""
+ENDS_FIRST, ENDS_AWAY = 1.0, (0.10, 0.75)
+"""How early the lid's ends go before its middle, 0.15 of their way at a third of the stroke, and from and to
+which azimuth. Without it the edge of a half-shut lid was a straight line; people's is an arch."""
 SIDE_TAGS = {1: "L", -1: "R"}
 # Gap between the shut edges, least distances of the loops from the eye, and the softness of the lift, cm.
 _OVERLAP_CM, _CLEARANCE_CM, _SOFT_CM = -0.004, (0.005, 0.035, 0.075), 0.012
@@ -152,15 +155,18 @@ class BlinkPath:
         angle = share * _profile(at, edge, passed) / globe.radius
         return turned_about(out, near, globe, -angle)
 
-    def _along(self, side: int, stroke: float) -> Array:
+    def _along(self, side: int, whole: float) -> Array:
         """Where a side's moved vertices are: on great circles near the globe, else straight."""
         globe, moved = self.globes[side], self._moved[side]
         start, end = (self.rest - globe.centre)[moved], self._shut[side][moved]
         r0, r1 = np.linalg.norm(start, axis=1), np.linalg.norm(end, axis=1)
+        away = np.abs(np.arctan2(start[:, 0], np.maximum(start[:, 2], 0.1)))
+        stroke = whole + ENDS_FIRST * whole * (1 - whole) ** 2 * smooth(*ENDS_AWAY, away)
         radius = r0 + stroke * (r1 - r0)
         round_way = slerp(start / r0[:, None], end / r1[:, None], stroke) * radius[:, None]
         near = np.clip((_NEAR_CM - r0) / _REACH_CM, 0, 1)[:, None]
-        return np.asarray(globe.centre + (start + stroke * (end - start)) * (1 - near) + round_way * near)
+        straight = start + stroke[:, None] * (end - start)
+        return np.asarray(globe.centre + straight * (1 - near) + round_way * near)
 
     def _shut_about_globe(self, side: int) -> Array:
         """Shut position relative to the globe's center: the kit's, corrected so that the edges meet."""

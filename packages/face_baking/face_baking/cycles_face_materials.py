@@ -30,7 +30,7 @@ def materials(settings: dict[str, Any]) -> dict[str, Any]:
         "film": film(settings["lights"]),
         "tear": tear(settings["lights"]),
         "spectacles": spectacles(),
-        "lash": hair("lash", [min(0.004, c * 0.12) for c in look["hair"]], 0.25, (0.55, 1.9)),
+        "lash": hair("lash", [min(0.009, c * 0.25) for c in look["hair"]], 0.25, (0.55, 1.9)),
         "brow": hair("brow", look["hair"], 0.33, (0.7, 1.45)),
     }
 

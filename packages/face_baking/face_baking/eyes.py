@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from face_baking.blink_path import BlinkPath, nasal_tip
 from face_baking.field_noise import value_noise
@@ -19,15 +20,19 @@ _SHADE_REACH_CM = (0.42, 0.16)
 _SHADE_DEPTH = (0.62, 0.40)
 _TURNED_AWAY, _TURNED_DEPTH = (0.55, 1.25), 0.32
 """Radians from the gaze axis between which the white loses that share of its light to brow and nose."""
-CARUNCLE_AT, CARUNCLE_CM = 17, (0.27, 0.03, 0.085)
-"""Point of the lids' edges (of 200) about which the corner's flesh lies; its half length, what of its half
-height lies under either lid, and its half depth, cm."""
-CARUNCLE_LIGHT, CARUNCLE_SINKS = (0.85, 1.7), 0.22
-"""Its lightness over the white's, with dark and with light skin, where the darker one looked burned; and the
-slope at which its temporal half sinks into the white."""
-_PLICA_CM, _PLICA_WIDE_CM, _PLICA_HIGH_CM = 0.40, 0.07, 0.028
-"""Way of the plica's crest from the corner's tip, its half width, and its height under the film."""
-_FLUSHED_CM = (0.30, 0.46)
+CARUNCLE_LIGHT = (0.85, 1.7)
+"""Lightness of the corner's flesh over the white's, with dark and with light skin: there the darker one
+looked burned."""
+_FLOORS = {True: (0.075, (0.12, 0.95)), False: (0.035, (0.0, 0.55))}
+"""How deep the floor of the nasal corner, and of the temporal one, lies below the lids' edges; from and to
+which way from the tip it falls to the globe, cm."""
+_FLESH_CM, _FLESH_HIGH_CM = (0.20, 0.19), 0.065
+"""Way of the caruncle's middle from the corner's tip, its half length, and its height over the floor."""
+_PLICA_CM, _PLICA_WIDE_CM, _PLICA_HIGH_CM = 0.45, 0.07, 0.022
+"""Way of the plica's crest from the corner's tip, its half width, and its height over the floor."""
+_FLOOR_SOFT_CM, _FLOOR_UNDER_CM = 0.04, 0.06
+"""How softly the floor runs into the globe, and how far it reaches under either lid."""
+_FLUSHED_CM = (0.30, 0.66)
 """Distances from the nasal corner between which the eye's white turns from the corner's pink to its own."""
 
 
@@ -58,54 +63,93 @@ def eyeball(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
     turned = 1 - _TURNED_DEPTH * smooth(*_TURNED_AWAY, angle)
     # Between lids that meet, shadows that are rendered leave little: this one would make the slit black.
     shade = turned * (1 - (1 - _lid_shade(path, posed, side, mesh.vertices)) * (1 - 0.35 * stroke))
-    shade, flush, plica = _nasal_end(path, side, mesh.vertices, sclera, shade)
-    out = mesh.vertices - path.globes[side].centre
-    out *= 1 + (_PLICA_HIGH_CM * plica / np.maximum(np.linalg.norm(out, axis=1), 0.1))[:, None]
-    values = {"sclera": sclera, "shade": shade, "flush": flush}
-    return Mesh(path.globes[side].centre + out, mesh.quads, uv, values)
+    shade, flush = _nasal_end(path, side, mesh.vertices, sclera, shade)
+    return Mesh(mesh.vertices, mesh.quads, uv, {"sclera": sclera, "shade": shade, "flush": flush})
 
 
 def _nasal_end(
     path: BlinkPath, side: int, vertices: Array, sclera: Array, shade: Array
-) -> tuple[Array, Array, Array]:
-    """(n,) shade and flush of the white, and the height of its nasal fold, the plica, as a share."""
+) -> tuple[Array, Array]:
+    """(n,) shade and flush of the white near the nose."""
     away = (vertices - nasal_tip(path, path.rest, side, EDGE_LOOP))[:, :2]
     from_corner = np.hypot(away[:, 0], 0.6 * away[:, 1])
-    plica = np.exp(-(((from_corner - _PLICA_CM) / _PLICA_WIDE_CM) ** 2)) * sclera
-    corner = smooth(_PLICA_CM + 0.06, _PLICA_CM - 0.08, from_corner) * sclera
-    nasal = smooth(_PLICA_CM + 0.50, _PLICA_CM, from_corner) * sclera
+    nasal = smooth(_PLICA_CM + 0.65, _PLICA_CM, from_corner) * sclera
     # Both lids are near there, and what is rendered of their shadow is enough.
-    shade = 1 - (1 - shade) * (1 - 0.6 * nasal) * (1 - 0.5 * corner)
-    flush = np.maximum(smooth(_FLUSHED_CM[1], _FLUSHED_CM[0], from_corner) * sclera, 0.8 * plica)
-    crease = np.exp(-(((from_corner - _PLICA_CM - 1.2 * _PLICA_WIDE_CM) / 0.03) ** 2))
-    return shade * (1 - 0.12 * crease * sclera), flush, plica
+    shade = 1 - (1 - shade) * (1 - 0.8 * nasal)
+    return shade, smooth(_FLUSHED_CM[1], _FLUSHED_CM[0], from_corner) * sclera
 
 
-def caruncle(path: BlinkPath, posed: Array, side: int, stroke: float, melanin: float) -> Mesh:
-    """The flesh between the lids' nasal ends, a bare and wet knob; shut lids press it flat."""
-    ends = np.stack([edge_line(path, posed, side, EDGE_LOOP, upper) for upper in (True, False)])
-    high, low = ends[:, CARUNCLE_AT]
-    along = ends[:, 2 * CARUNCLE_AT].mean(0) - ends[:, 0].mean(0)
-    along /= np.linalg.norm(along)
-    length, under, depth = CARUNCLE_CM
-    half_height = (high[1] - low[1]) / 2 + under
-    rings, sectors = 24, 32
-    around = np.linspace(0, 2 * np.pi, sectors, endpoint=False)
-    polar, turn = np.meshgrid(np.linspace(0, 0.6 * np.pi, rings + 1), around, indexing="ij")
-    round_it = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], -1)
-    local = round_it.reshape(-1, 3) * np.array([length * (1 - 0.3 * stroke), half_height, depth])
-    local *= 1 + 0.07 * value_noise(local * np.array([side * 14.0, 14.0, 14.0]), 3 + side, 2)[:, None]
-    # Of one height to its end, it ended before the white as if cut off.
-    temporal = np.clip(local[:, 0] / length, 0, 1)
-    local[:, 1] *= 1 - 0.4 * temporal**2
-    local[:, 2] -= CARUNCLE_SINKS * np.clip(local[:, 0], 0, None)
-    middle = (high + low) / 2 - np.array([0, 0, depth * (1.0 + 0.4 * stroke)])
-    vertices = middle + local[:, :1] * along + local[:, 1:] @ np.array([[0, 1.0, 0], [0, 0, 1.0]])
-    dark, light = CARUNCLE_LIGHT
+def corner_floor(
+    path: BlinkPath, posed: Array, side: int, stroke: float, nasal: bool, melanin: float
+) -> Mesh:
+    """The wet floor between the lids' ends: lake, flesh and plica at the nose, the white's end at the temple.
+
+    The lids leave the globe there by 1 to 4 mm, and what lies between was a dark gap.
+    """
+    globe, (lake, falls) = path.globes[side], _FLOORS[nasal]
+    points, way, across, front = _between_lids(path, posed, side, nasal)
+    out = points - globe.centre
+    radius = np.linalg.norm(out, axis=-1)
+    stays = 1 - smooth(*falls, way)
+    height = (radius - globe.radius) * stays - lake - 0.12 * (1 - stays)
+    height = height - 0.04 * stroke - 0.03 * across**4 - 0.3 * np.clip(-way, 0, None)
+    flesh, plica = _flesh_and_plica(way, across, side)
+    height += nasal * (_FLESH_HIGH_CM * flesh + _PLICA_HIGH_CM * plica) * (1 - 0.5 * stroke)
+    above = _FLOOR_SOFT_CM * np.logaddexp(0, height / _FLOOR_SOFT_CM)
+    angle, uv = _eye_uv(path, side, stroke, points.reshape(-1, 3))
+    # Below the white before the iris's rim, where the white itself sinks.
+    sunk = (0.004 + 0.06 * smooth(0.65, 0.48, angle)).reshape(height.shape)
+    out *= ((globe.radius + above - sunk - 0.15 * ~front) / radius)[..., None]
+    vertices = (globe.centre + out).reshape(-1, 3)
     whole = np.ones(len(vertices))
-    lightness = dark + (light - dark) * smooth(0.9, 0.3, np.asarray(melanin))
-    values = {"sclera": whole, "shade": lightness * whole, "flush": whole}
-    return Mesh(vertices, _tube_quads(rings, sectors), np.full((len(vertices), 2), 0.93), values)
+    shade = 1 - _TURNED_DEPTH * smooth(*_TURNED_AWAY, angle)
+    shade = shade * (1 - (1 - _lid_shade(path, posed, side, vertices)) * (1 - 0.35 * stroke))
+    if nasal:
+        shade, flush = _nasal_end(path, side, vertices, whole, shade)
+        dark, light = CARUNCLE_LIGHT
+        lightness = dark + (light - dark) * float(smooth(0.9, 0.3, np.asarray(melanin)))
+        share = (smooth(_PLICA_CM + 0.16, _PLICA_CM - 0.14, way) * np.ones_like(height)).ravel()
+        shade = shade + share * (lightness * (0.7 + 0.3 * np.clip(flesh, 0, 1)).ravel() - shade)
+    else:
+        flush = (0.5 * smooth(0.22, 0.02, way) * np.ones_like(height)).ravel()
+    rings, sectors = height.shape
+    values = {"sclera": whole, "shade": shade, "flush": flush}
+    return Mesh(vertices, _tube_quads(rings - 1, sectors), uv, values)
+
+
+def _between_lids(
+    path: BlinkPath, posed: Array, side: int, nasal: bool
+) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
+    """(n, m, 3) points between the lids' edges from one end on, round a flat tube; its front's and back's.
+
+    Also (n, 1) way from the tip, below 0 beyond it, (1, m) way across from lower to upper lid, -1 to 1, and
+    (1, m) whether a point is on the tube's front.
+    """
+    upper, lower = (
+        edge_line(path, posed, side, EDGE_LOOP, up)[:: 1 if nasal else -1][:72] for up in (True, False)
+    )
+    middle, half = (upper + lower) / 2, (upper - lower) / 2
+    way = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1))])
+    beyond = middle[0] - middle[30]
+    before = np.linspace(-0.25, -0.01, 12)
+    middle = np.vstack([middle[0] - before[:, None] * beyond / np.linalg.norm(beyond), middle])
+    half = np.vstack([np.zeros((len(before), 3)), half])
+    way = np.concatenate([before, way])[:, None]
+    across = np.concatenate([np.linspace(-1, 1, 25), np.linspace(1, -1, 9)[1:-1]])[None]
+    points = middle[:, None] + half[:, None] * across[..., None]
+    # The tip is blunt, and the lines of its edges are rounded: past it there was a hole.
+    points[..., 1] += (_FLOOR_UNDER_CM + 0.08 * smooth(0.25, 0.0, way)) * across
+    return points, way, across, np.arange(across.size)[None] < 25
+
+
+def _flesh_and_plica(way: Array, across: Array, side: int) -> tuple[Array, Array]:
+    """(n, m) shares of the caruncle's and the plica's height."""
+    along = (way - _FLESH_CM[0]) / _FLESH_CM[1]
+    dome = np.clip(1 - along**2 - (across / 0.95) ** 2, 0, None) ** 0.6
+    where = np.stack(np.broadcast_arrays(13 * way, 1.7 * across, side), -1).reshape(-1, 3)
+    grain = value_noise(where, 3 + side, 2).reshape(dome.shape)
+    plica = np.exp(-(((way - _PLICA_CM - 0.08 * across**2) / _PLICA_WIDE_CM) ** 2))
+    return dome * (1 + 0.25 * grain), plica
 
 
 def wet_film(path: BlinkPath, side: int, stroke: float) -> Mesh:
@@ -125,10 +169,7 @@ def _dome(
 ) -> tuple[Mesh, Array]:
     """Surface of revolution about the gaze axis, and each vertex's angle from it."""
     rings, sectors = size
-    ahead = path.gaze(side, stroke)
-    right = np.cross([0, 1.0, 0], ahead)
-    right /= np.linalg.norm(right)
-    frame = np.stack([right, np.cross(ahead, right), ahead])
+    frame = _eye_frame(path, side, stroke)
     angle, turn = np.meshgrid(
         np.linspace(0, limit, rings + 1), np.linspace(0, 2 * np.pi, sectors, endpoint=False), indexing="ij"
     )
@@ -139,6 +180,23 @@ def _dome(
     uv = 0.5 + angle[..., None] / TEXTURE_LIMIT * 0.5 * np.stack([np.cos(turn), np.sin(turn)], -1)
     vertices = path.globes[side].centre + local.reshape(-1, 3) @ frame
     return Mesh(vertices, _tube_quads(rings, sectors), uv.reshape(-1, 2)), angle.ravel()
+
+
+def _eye_frame(path: BlinkPath, side: int, stroke: float) -> Array:
+    """(3, 3) right, up and ahead of an eye's gaze."""
+    ahead = path.gaze(side, stroke)
+    right = np.cross([0, 1.0, 0], ahead)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(ahead, right), ahead])
+
+
+def _eye_uv(path: BlinkPath, side: int, stroke: float, vertices: Array) -> tuple[Array, Array]:
+    """(n,) angles from the gaze, and the (n, 2) places in the eye's texture, of points off the globe."""
+    local = (vertices - path.globes[side].centre) @ _eye_frame(path, side, stroke).T
+    beside = np.hypot(local[:, 0], local[:, 1])
+    angle = np.arctan2(beside, local[:, 2])
+    uv = 0.5 + side * np.minimum(angle / TEXTURE_LIMIT, 0.97)[:, None] * 0.5 * local[:, :2] / beside[:, None]
+    return angle, uv
 
 
 def _tube_quads(rings: int, sectors: int) -> Index:
@@ -172,11 +230,14 @@ def tear_line(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
     away = edge - centre
     radius = np.linalg.norm(away, axis=1)
     gap = path.clearance(edge, side, stroke)
-    line = centre + away / radius[:, None] * (radius - gap + 0.012)[:, None] + np.array([0, 0.012, 0])
+    # Where the lids leave the globe it lies on the corners' floor.
+    depth = (radius - np.minimum(gap, 0.05) + 0.012)[:, None]
+    line = centre + away / radius[:, None] * depth + np.array([0, 0.012, 0])
     along = np.arange(len(line))
-    # It thins out well before the temporal corner: there a wide one mirrors a light as a white bar.
-    inset = np.clip(along[::-1] / 40, 0, 1)
-    lake = 1.6 * np.exp(-(((along - 10) / 8) ** 2))
+    # It thins out well before the temporal corner: there a wide one mirrors a light as a white bar. Round
+    # the tip of the nasal corner it was a bright hook.
+    inset = np.clip(along[::-1] / 40, 0, 1) * np.clip((along - 14) / 14, 0, 1)
+    lake = 0.5 * np.exp(-(((along - 36) / 10) ** 2))
     thickness = 0.024 * (inset + lake) * (1 - 0.7 * smooth(0.9, 1.0, stroke))
     return tube(line, thickness)
 

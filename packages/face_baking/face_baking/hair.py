@@ -17,7 +17,7 @@ from stimuli_builder.characters.colour import smooth
 LASH_POINTS, BROW_POINTS = 12, 8
 CLUMPS = {True: [0.14, 0.28, 0.32, 0.26], False: [0.60, 0.28, 0.09, 0.03]}
 """Shares of clumps of one to four lashes of upper and lower lids: lower ones in even bundles look planted."""
-FANNED_UNTIL, RAISED_DEGREES = 0.55, 8.0
+FANNED_UNTIL, RAISED_DEGREES = 0.62, 10.0
 """Stroke until which the upper lashes point where the open eye's point, and how far they rise on the way.
 
 In recordings they stay fanned before the lid until it is six tenths shut, and only then go down.

@@ -23,7 +23,7 @@ CORNER_NARROWED = ((-1.9, -0.6, -0.2, 0.1, 0.5, 0.9, 1.2), (0.0, 0.0, -0.05, 0.2
 """Share of its height that the wedge loses, at the same places."""
 CORNER_FADES_CM = (0.25, 1.1)
 """Heights from the corner up to which the shift is whole, and from which there is none."""
-CORNER_BACK = 0.35
+CORNER_BACK = 0.18
 """Share of the globe's curve that the drawn-out lids follow; the whole of it would sink the corner 3 mm."""
 
 

@@ -29,6 +29,8 @@ stretched skin it needs more depth and roll to be as dark as on the open lid, an
 """
 STRETCHED_DEPTH, STRETCHED_ROLL, STRETCHED_WIDTH = 0.8, 0.5, 0.10
 """By how much: shares more, and mesh loops less."""
+FOLD_STEP = 0.6
+"""Width of the fold's upper slope over that of its lower one."""
 FOLD_REMAINS = 0.85
 """Share of the fold that a shut lid keeps: in recordings its crease and the step above it stay."""
 MOUND_RISE_CM, MOUND_CM = 0.05, 0.10
@@ -74,27 +76,40 @@ class LidRelief:
         """(n,) cm along the normal, at each vertex's stroke: folds, the nasal corner's flesh, grain."""
         at, surface, opened = self.coordinates, self._waves[2], 1 - stroke
         grain = 0.0020 * surface * smooth(3.5, 6.0, at.loop)
-        mound = MOUND_RISE_CM * opened * self._mound * (1 + 0.5 * surface)
+        mound = MOUND_RISE_CM * opened * self._mound * np.maximum(1 + 0.5 * surface, 0)
         return np.asarray(self._upper_folds(stroke) + self._lower_folds() + grain + mound)
+
+    @cached_property
+    def above_fold(self) -> Array:
+        """(n,) mesh loops by which each vertex lies above the upper lid's fold."""
+        at = self.coordinates
+        height = self._lids.crease + 0.35 * self._waves[0]
+        height = height - 0.9 * smooth(0.1, -0.8, at.azimuth) - 0.5 * smooth(0.5, 1.2, at.azimuth)
+        return np.asarray(at.loop - height)
+
+    @cached_property
+    def fold_reach(self) -> Array:
+        """(n,) 1 along the upper lid's fold, 0 at both corners and below the eye."""
+        at = self.coordinates
+        return np.asarray(smooth(-0.85, -0.35, at.azimuth) * smooth(1.25, 0.75, at.azimuth) * at.upper)
 
     def _upper_folds(self, stroke: Array) -> Array:
         """The open lid's fold, what is left of it on a shut lid, and that one's lines."""
         at, lids = self.coordinates, self._lids
         wander, lines, _ = self._waves
-        years = self._years
-        envelope = smooth(-0.85, -0.35, at.azimuth) * smooth(1.25, 0.75, at.azimuth) * at.upper
-        height = lids.crease + wander * 0.6
-        height = height - 0.9 * smooth(0.1, -0.8, at.azimuth) - 0.5 * smooth(0.5, 1.2, at.azimuth)
-        above, opened = at.loop - height, smooth(FOLD_UNROLLS[1], FOLD_UNROLLS[0], stroke)
+        years, above, envelope = self._years, self.above_fold, self.fold_reach
+        opened = smooth(FOLD_UNROLLS[1], FOLD_UNROLLS[0], stroke)
         opened = FOLD_REMAINS + (1 - FOLD_REMAINS) * opened
         stretched = opened * smooth(*FOLD_STRETCHED, stroke)
         # Of one depth from end to end it was a line drawn round the eye: it runs out, and is nowhere gone.
-        uneven = np.clip(0.85 + 0.9 * wander - 0.35 * np.abs(at.azimuth - LID_MIDDLE), 0.35, 1.1)
+        uneven = np.clip(0.95 + 0.4 * wander - 0.25 * np.abs(at.azimuth - LID_MIDDLE), 0.6, 1.1)
         width = 0.30 + 0.18 * opened - STRETCHED_WIDTH * stretched
+        # The lid slips under the skin above it: a step, and no groove with two equal slopes.
+        width = np.where(above > 0, FOLD_STEP * width, width)
         depth = (0.026 + 0.026 * opened) * (1 + STRETCHED_DEPTH * stretched)
-        roll = 0.030 * opened * (1 + STRETCHED_ROLL * stretched)
+        roll = 0.034 * opened * (1 + STRETCHED_ROLL * stretched)
         fold = -lids.depth * uneven * depth * np.exp(-((above / width) ** 2))
-        fold += lids.depth * roll * np.exp(-(((above - 1.15) / 0.8) ** 2))
+        fold += lids.depth * roll * np.exp(-(((above - 0.95) / 0.7) ** 2))
         second = np.exp(-(((above - 1.5) / 0.22) ** 2)) * (0.4 + 0.6 * stroke)
         fold -= 0.012 * years * second * np.clip(0.5 + 1.2 * wander, 0, 1)
         furrows = np.exp(-((lines / 0.22) ** 2)) * smooth(3.6, 5.0, at.loop) * smooth(11.5, 8.5, at.loop)

@@ -27,6 +27,9 @@ RIM_PALER = 0.35
 
 Dark skin, paler there by as much, had a bright band all along its lower lids, as if it wore goggles.
 """
+FOLD_MELANIN, FOLD_BLOOD, FOLD_WIDE = 0.22, 0.10, 0.4
+"""What the skin in the upper lid's fold has more than the lid's, and its half width in mesh loops: when the
+fold unrolls, a line of it remains."""
 CORNER_CM, CORNER_BLOOD = 0.30, 0.28
 """Reach and added blood of a nasal corner's duller skin: lit and smooth, its fold shone as a white dot."""
 LID_VESSELS = 0.10
@@ -87,6 +90,7 @@ class Pigments:
         """(n,) optical depth of melanin with what varies it: lids, margins, mottling, speckle, freckles."""
         upper, uneven = self.skin.coordinates.upper, np.clip(1 + 0.5 * self._noise(7.0, 42, 2), 0.4, 1.5)
         out = self._melanin(lips) * (1 - RIM_PALER * self.contrast * wet) * (1 + LID_MELANIN * lid)
+        out *= 1 + FOLD_MELANIN * self._fold()
         out += wet * uneven * (UPPER_MARGIN * upper + LOWER_MARGIN * (1 - upper))
         mottled = self._noise(1.3, 11) + self.facing * self._noise(6.0, 12)
         out *= 1 + self.contrast * 0.10 * mottled
@@ -97,8 +101,14 @@ class Pigments:
         """(n,) optical depth of blood with what varies it: margins, mottling, speckle, the lids' vessels."""
         out = self._haemoglobin(lips) + wet * self._rim_blood() + LID_BLOOD * lid + CORNER_BLOOD * corner
         out *= 1 + 0.13 * self._noise(1.8, 13, 4) + 0.15 * self.facing * self._noise(9.0, 14)
+        out += FOLD_BLOOD * self._fold()
         out += LID_VESSELS * lid * np.exp(-((self._noise(4.5, 43, 3) / 0.07) ** 2))
         return np.asarray(out * np.clip(1 + self.calm * 0.18 * self._noise(15.0, 23, 2), 0.5, 1.6))
+
+    def _fold(self) -> Array:
+        """(n,) 1 in the upper lids' fold, 0 away from it."""
+        relief = self.skin.relief
+        return np.asarray(relief.fold_reach * np.exp(-((relief.above_fold / FOLD_WIDE) ** 2)))
 
     def _rim_blood(self) -> Array:
         """(n,) blood of the lids' wet margins, more toward the corners: even, it is a drawn line."""

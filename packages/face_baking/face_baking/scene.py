@@ -15,7 +15,7 @@ import numpy as np
 
 from face_baking.blink_path import BlinkPath
 from face_baking.eye_texture import DARK_WHITE, White, eye_maps
-from face_baking.eyes import Mesh, caruncle, eyeball, tear_line, wet_film
+from face_baking.eyes import Mesh, corner_floor, eyeball, tear_line, wet_film
 from face_baking.framing import FRAMINGS, Box, Framing, View
 from face_baking.hair import Brow, Lashes, Strands
 from face_baking.identity import Identity
@@ -104,7 +104,12 @@ class FaceScene:
             stroke = strokes[side]
             parts += [
                 Part(f"eye_{name}", "eye", eyeball(self.path, coarse, side, stroke)),
-                Part(f"caruncle_{name}", "eye", caruncle(self.path, coarse, side, stroke, melanin)),
+                *(
+                    Part(
+                        f"{end}_{name}", "eye", corner_floor(self.path, coarse, side, stroke, nasal, melanin)
+                    )
+                    for end, nasal in (("corner", True), ("temple", False))
+                ),
                 Part(f"film_{name}", "film", wet_film(self.path, side, stroke)),
                 Part(f"tear_{name}", "tear", tear_line(self.path, coarse, side, stroke)),
                 Part(f"brow_{name}", "brow", self._brows[side].at(posed)),

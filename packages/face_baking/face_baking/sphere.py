@@ -21,8 +21,8 @@ def cartesian(radius: Array, azimuth: Array, elevation: Array) -> Array:
     return np.stack([flat * np.sin(azimuth), radius * np.sin(elevation), flat * np.cos(azimuth)], -1)
 
 
-def slerp(start: Array, end: Array, share: float) -> Array:
-    """(n, 3) unit vectors `share` of the way along the great circles from `start` to `end`."""
+def slerp(start: Array, end: Array, share: Array) -> Array:
+    """(n, 3) unit vectors a (n,) `share` of the way along the great circles from `start` to `end`."""
     angle = np.arccos(np.clip((start * end).sum(-1), -1, 1))
     near = angle < 1e-6
     sine = np.where(near, 1, np.sin(angle))

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from face_baking.blink_path import BlinkPath, nasal_tip
-from face_baking.eyes import Mesh, caruncle, eyeball
+from face_baking.eyes import Mesh, corner_floor, eyeball
 from face_baking.hair import edge_line
-from face_baking.identity import identity_of_seed
+from face_baking.identity import identity_of_seed, load_identity
 from face_baking.kit import FaceKit
 from face_baking.lid_loops import EDGE_LOOP, LASH_LOOP, SIDES, chains
 from face_baking.scene import Part
 from face_baking.sphere import IRIS_CM
+from scipy.spatial import cKDTree
 
 
 @pytest.fixture(scope="module")
@@ -30,22 +31,41 @@ def near_corner(path: BlinkPath, mesh: Mesh, side: int) -> np.ndarray:
 
 @pytest.mark.parametrize("stroke", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("side", SIDES)
-def test_the_flesh_of_the_corner_lies_between_the_lids_ends(
-    path: BlinkPath, side: int, stroke: float
+@pytest.mark.parametrize("name", ["cedar", "alder", "hazel", "birch"])
+def test_between_the_lids_no_gap_is_left_at_either_corner(
+    kit: FaceKit, name: str, side: int, stroke: float
 ) -> None:
+    """A floor lies behind the whole of the lids' ends, and in front of it nothing but their edges."""
+    identity = load_identity(name)
+    path = BlinkPath(kit, identity.rest(kit), identity.movement)
     posed = path.at({1: stroke, -1: stroke})
-    knob = caruncle(path, posed, side, stroke, 0.5).vertices
-    upper, lower = chains(path.kit, path.loops[side][EDGE_LOOP], side)
-    corner = posed[upper[0]]
-    assert np.abs(knob[:, 0].mean() - corner[0]) < 0.35
-    assert knob[:, 2].max() < posed[np.concatenate([upper[:5], lower[:7]]), 2].max()
-    assert not np.isclose(knob[:, 1], knob[0, 1]).all()
+    chain = np.concatenate(chains(path.kit, path.loops[side][EDGE_LOOP], side))
+    edge = posed[chain]
+    across = (edge[:, 0] - path.globes[side].centre[0]) * side
+    for nasal, here in ((True, across < across.min() + 0.4), (False, across > across.max() - 0.2)):
+        end, floor = edge[here], corner_floor(path, posed, side, stroke, nasal, 0.5)
+        inward = end[None, :, :2] * 0.7 + 0.3 * end[:, :2].mean(0)
+        away, nearest = cKDTree(floor.vertices[:, :2]).query(inward.reshape(-1, 2))
+        assert away.max() < 0.06
+        assert floor.vertices[nearest, 2].max() < edge[:, 2].max()
 
 
 def test_the_flesh_of_light_skin_is_lighter(path: BlinkPath) -> None:
     posed = path.at({1: 0.0, -1: 0.0})
-    light, dark = (caruncle(path, posed, 1, 0.0, melanin).values["shade"] for melanin in (0.2, 1.0))
-    assert light.min() > 1.5 * dark.max()
+    light, dark = (corner_floor(path, posed, 1, 0.0, True, melanin) for melanin in (0.2, 1.0))
+    flesh = light.values["flush"] > 0.99
+    assert flesh.sum() > 100
+    assert (light.values["shade"][flesh] > 1.2 * dark.values["shade"][flesh]).mean() > 0.9
+
+
+@pytest.mark.parametrize("side", SIDES)
+def test_the_corners_floor_runs_into_the_white(path: BlinkPath, side: int) -> None:
+    """Toward the iris it lies below the white, and no edge of it is seen."""
+    floor = corner_floor(path, path.at({1: 0.0, -1: 0.0}), side, 0.0, True, 0.5)
+    out = floor.vertices - path.globes[side].centre
+    height, beside = np.linalg.norm(out, axis=1) - path.globes[side].radius, np.abs(out[:, 0])
+    assert height[beside < IRIS_CM + 0.02].max() < 0
+    assert height[(beside > 1.25) & (out[:, 0] * side < 0)].max() > 0.05
 
 
 @pytest.mark.parametrize("side", SIDES)
