@@ -30,6 +30,7 @@ function whatIsKnown(): Known {
 export function StartPage() {
   useDocumentTitle("Welcome – Palpebra");
   const [{ demo, minutes, invitation, folder }] = useState(whatIsKnown);
+  const first = invitation === null ? "" : "Create your account first. ";
   const entrance = (to: string) => (invitation === null ? "/admin" + to : `/admin/invitation?next=${encodeURIComponent(to)}#${invitation}`);
   return (
     <Container size="lg" py={48} component="main">
@@ -51,17 +52,13 @@ export function StartPage() {
         )}
         <Choice
           title="Make a study from my clips"
-          text={
-            invitation === null
-              ? "Upload clips, say what varies, and get a link for participants."
-              : "Create your account first. Then upload clips, say what varies, and get a link for participants."
-          }
+          text={`${first}Upload clips, say what varies, and get a link for participants.`}
           button={invitation === null ? "New study" : "Create account"}
           href={entrance(FROM_CLIPS)}
         />
         <Choice
           title="Analyze data"
-          text="Drop a table of ratings that you already have: ANOVA, mixed models, pairs or opinion scores."
+          text={`${first}Drop a table of ratings that you already have: ANOVA, mixed models, pairs or opinion scores.`}
           button="Choose a table"
           href={entrance(FROM_TABLE)}
         />
