@@ -92,13 +92,15 @@ if (typeof Search !== "undefined") {
     words.has(word) ||
     (word.length > 3 && [...words].some((one) => one.startsWith(word)));
 
-  // A word that few questions have says more than one that many have.
+  // A word that few questions have says more than one that many have; one that none has says little.
   const fittingQuestions = (words) => {
     const weights = [...words].map((word) => {
       const hits = questions.filter((question) =>
         has(question.words, word),
       ).length;
-      return [word, Math.log((questions.length + 1) / (hits + 0.5))];
+      const weight =
+        hits > 0 ? Math.log((questions.length + 1) / (hits + 0.5)) : 1.5;
+      return [word, weight];
     });
     const total = weights.reduce((sum, [, weight]) => sum + weight, 0);
     return questions
