@@ -67,7 +67,7 @@ QUESTIONS = {
     "nightly backups": "how-to/back-up-and-restore.html#back-up",
     "typo in a question": "how-to/change-a-running-study.html",
     "what does a quota count": "how-to/recruit.html#send-one-link-to-everyone",
-    "size in mm without eyes": "how-to/size-and-devices.html#size-of-clips-without-eyes-in-mm",
+    "size in mm without eyes": "how-to/size-and-devices.html#size-of-your-own-clips-in-mm",
     "completion codes by outcome": "how-to/recruit.html#prolific-sona-and-mechanical-turk",
     "blinks at given times": "how-to/animate-blinks.html",
     "same clip twice": "how-to/order-and-counterbalance.html#how-often-each-clip-is-shown",
