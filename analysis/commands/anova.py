@@ -1,6 +1,7 @@
 """`analysis anova`: anyone's long table."""
 
 from dataclasses import replace
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -20,6 +21,13 @@ from analysis.commands.output import (
 )
 from experiments.errors import InputError
 from experiments.files import check_folder
+
+
+class ReportedTest(StrEnum):
+    """Which F a report states first."""
+
+    MULTIVARIATE = "multivariate"
+    UNIVARIATE = "univariate"
 
 
 def register(app: typer.Typer) -> None:
@@ -71,6 +79,12 @@ def anova(
         str | None,
         typer.Option(help="Bounds of equivalence of pairs, in rating units: 0.5 or -0.3,0.5."),
     ] = None,
+    statistic: Annotated[
+        ReportedTest,
+        typer.Option(
+            help="Test reported first: multivariate (Pillai), or univariate with Greenhouse-Geisser df."
+        ),
+    ] = ReportedTest.MULTIVARIATE,
     robust: Annotated[
         bool, typer.Option("--robust", help="Add permutation tests, aligned ranks and trimmed means.")
     ] = False,
@@ -98,6 +112,8 @@ def anova(
       analysis anova long.csv --participant id --rating score --within phase --between group --covariate age
 
       analysis anova ratings.csv --participant id --rating score --within face --robust --bayes
+
+      analysis anova ratings.csv --participant id --rating score --within face --statistic univariate
 
     The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants.
     """
@@ -138,6 +154,7 @@ def anova(
             equivalence_bounds=equivalence_bounds(equivalence),
             planned_contrasts=[_contrast(text) for text in contrast or ()],
             decisions=data.decisions,
+            univariate=statistic is ReportedTest.UNIVARIATE,
         )
     if robust:
         # scipy.stats takes a second to import: only commands that use it import it

@@ -99,11 +99,12 @@ class Analysis:
     exclusions: "Exclusions | None" = None
     robust: "Companions | None" = None
     bayes: "BayesAnova | None" = None
+    univariate: bool = False
 
     @property
     def multivariate_first(self) -> bool:
         """Whether the F reported first is the multivariate one: `reports_multivariate`."""
-        return reports_multivariate(self.anova, plans_multivariate(self.experiment))
+        return reports_multivariate(self.anova, not self.univariate)
 
     @property
     def n_participants(self) -> int:
@@ -132,8 +133,10 @@ def analyse_cells(
     labels: Labels | None = None,
     experiment: "Experiment | None" = None,
     exclusions: "Exclusions | None" = None,
+    univariate: bool = False,
 ) -> Analysis:
-    """Run every test on a table of cell means."""
+    """Run every test on a table of cell means; a study that plans univariate tests gets these first, too."""
+    univariate = univariate or not plans_multivariate(experiment)
     design = between or no_groups(len(cells.y))
     anova = linear_anova(cells.y, cells.factors, cells.levels, design, sum_of_squares)
     pairs = one_factor_pairs(anova)
@@ -152,7 +155,7 @@ def analyse_cells(
         pairs=pairs,
         decisions=(*decisions, *cell_decisions(cells), *group_decisions(anova)),
         labels=labels or Labels(),
-        simple_effects=simple_effects(anova, planned=plans_multivariate(experiment)),
+        simple_effects=simple_effects(anova, planned=not univariate),
         trends=trends(anova),
         contrasts=tuple(
             contrast
@@ -162,6 +165,7 @@ def analyse_cells(
         equivalence=equivalence(pairs, *equivalence_bounds) if equivalence_bounds else (),
         experiment=experiment,
         exclusions=exclusions,
+        univariate=univariate,
     )
 
 

@@ -63,6 +63,24 @@ def test_run_finds_the_default_database(tmp_path, monkeypatch) -> None:
     assert "no ratings of experiment 'exp3' in a study 'foo'" in elsewhere.stderr
 
 
+def test_anova_reports_the_univariate_test_first_where_asked(tmp_path) -> None:
+    (tmp_path / "t.csv").write_text(LONG)
+    command = ("anova", tmp_path / "t.csv", "--participant", "id", "--rating", "y", "--within", "face")
+    default, asked = call(*command), call(*command, "--statistic", "univariate", "--out", tmp_path / "out")
+    assert asked.exit_code == 0, asked.output
+    [effect] = json.loads((tmp_path / "out" / "results.json").read_text())["effects"]
+    found = effect["univariate"]
+    assert "2, 6" in table_row(default.stdout, "face")
+    assert f"{found['df_effect_gg']:.2f}, {found['df_error_gg']:.2f}" in table_row(asked.stdout, "face")
+    assert (tmp_path / "out" / "report.docx").is_file()
+    assert "univariate, df and p with the Greenhouse-Geisser correction" in asked.stdout
+
+
+def table_row(text: str, name: str) -> str:
+    """The first row that begins with `name`."""
+    return next(line for line in text.splitlines() if line.startswith(f"{name} "))
+
+
 def test_run_of_an_empty_export_exits_1(tmp_path) -> None:
     result = call("run", "exp3", "--csv", write_export(tmp_path / "e.csv", EXP3, []))
     assert result.exit_code == 1
