@@ -11,6 +11,7 @@ from analysis.commands.output import (
     SHOWN,
     JsonOption,
     ShownResult,
+    names_in,
     save_json,
     save_page,
     show_tables,
@@ -75,6 +76,10 @@ def reshape(
     ],
     out: Annotated[Path, typer.Option(help="CSV file to write.")],
     rating: Annotated[str, typer.Option(help="Name of the column of ratings in the new file.")] = "rating",
+    keep: Annotated[
+        str,
+        typer.Option(help="Columns that stay as they are although the pattern fits, separated by commas."),
+    ] = "",
 ) -> None:
     """Make a wide table long: one row per person and cell, as the other commands expect.
 
@@ -83,13 +88,15 @@ def reshape(
       analysis reshape wide.xlsx --columns '{face}_{blur}' --out long.csv
 
       analysis reshape wide.csv --columns 't{time}' --rating score --out long.csv
+
+      analysis reshape wide.csv --columns '{condition}' --keep id,age --out long.csv
     """
     from analysis.read.wide import lengthen
     from experiments.files import check_targets, whole_file
     from table_files.formulas import guarded_cell, guarded_row
 
     check_targets([out])
-    table = lengthen(file, columns, rating)
+    table = lengthen(file, columns, rating, names_in(keep))
     with whole_file(out) as temporary:
         rows = table.rows.rename(columns=guarded_cell).apply(guarded_row)
         rows.to_csv(temporary, index=False, encoding="utf-8", lineterminator="\n")

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.folder import reader_of
-from experiments.errors import InputError
+from experiments.errors import InputError, did_you_mean
 from table_files.cells import Cells
 
 # Blocks of rows that are in a table twice, as where a file was pasted twice.
@@ -226,7 +226,7 @@ def _hint(first: str, pattern: str) -> str:
     )
 
 
-def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
+def lengthen(path: Path, pattern: str, rating: str, kept: Sequence[str] = ()) -> LongTable:
     """Make a wide table long.
 
     Parameters
@@ -237,19 +237,32 @@ def lengthen(path: Path, pattern: str, rating: str) -> LongTable:
         Names of the columns of cells, each factor in braces: `{face}_{blur}`, `t{time}`.
     rating : str
         Name of the new column of numbers.
+    kept : sequence of str
+        Columns that are not cells, even if the pattern fits them.
 
     Raises
     ------
     InputError
-        A pattern without a factor, that no column fits, or that fits one in two ways; a name taken.
+        A pattern without a factor, that no or every column fits, or that fits one in two ways; a name that is
+        taken or missing.
     """
     reader = reader_of(path)
     header = [name for name in reader.header() if name]
     factors = tuple(_PLACEHOLDER.findall(pattern))
     _refuse_pattern(pattern, factors)
+    for name in kept:
+        if name not in header:
+            raise InputError(f"{path.name} has no column '{name}'{did_you_mean(name, header)}")
     levels = {
-        name: levels_of_column for name in header if (levels_of_column := _levels(pattern, name)) is not None
+        name: levels_of_column
+        for name in header
+        if name not in kept and (levels_of_column := _levels(pattern, name)) is not None
     }
+    if len(levels) == len(header):
+        raise InputError(
+            f"'{pattern}' fits every column of {path.name}, so none says who rated; name those that stay: "
+            f"--keep {header[0]}"
+        )
     if not levels:
         raise InputError(f"no column of {path.name} fits '{pattern}'; its columns: {', '.join(header)}")
     beside = tuple(name for name in header if name not in levels)

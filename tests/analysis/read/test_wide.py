@@ -70,6 +70,23 @@ def test_patterns_that_cannot_be_used_end_in_one_line(tmp_path, pattern, said) -
         lengthen(wide_file(tmp_path), pattern, "score")
 
 
+def test_columns_that_a_pattern_fits_by_chance_can_be_kept(tmp_path: Path) -> None:
+    """Columns `id, slow, fast`: the id is not a condition."""
+    path = tmp_path / "w.csv"
+    path.write_text("id,slow,fast\na,3,4\nb,5,6\n")
+    with pytest.raises(InputError, match=r"fits every column of w.csv, .*--keep id"):
+        lengthen(path, "{condition}", "score")
+    with pytest.raises(InputError, match="has no column 'ids'"):
+        lengthen(path, "{condition}", "score", ["ids"])
+    rows = lengthen(path, "{condition}", "score", ["id"]).rows
+    assert rows.values.tolist() == [
+        ["a", "slow", "3"],
+        ["a", "fast", "4"],
+        ["b", "slow", "5"],
+        ["b", "fast", "6"],
+    ]
+
+
 def test_a_name_that_fits_in_two_ways_is_refused(tmp_path) -> None:
     path = wide_file(tmp_path, "id,very_sad_blur\n1,2\n")
     with pytest.raises(InputError, match="in two ways"):
