@@ -88,33 +88,37 @@ if (typeof Search !== "undefined") {
     });
   };
 
-  const has = (words, word) =>
-    words.has(word) ||
-    (word.length > 3 && [...words].some((one) => one.startsWith(word)));
+  // Whether a question has a word: 1, or less where it has only a longer one.
+  const PART = 0.7;
+  const fit = (words, word) => {
+    if (words.has(word)) return 1;
+    const longer = [...words].some((one) => one.startsWith(word));
+    return word.length > 3 && longer ? PART : 0;
+  };
 
-  // A word that few questions have says more than one that many have; one that none has says little.
+  // A word that few questions have says more than one that many have.
+  const UNKNOWN = 2.2;
+  const ENOUGH = 0.55;
   const fittingQuestions = (words) => {
     const weights = [...words].map((word) => {
-      const hits = questions.filter((question) =>
-        has(question.words, word),
-      ).length;
-      const weight =
-        hits > 0 ? Math.log((questions.length + 1) / (hits + 0.5)) : 1.5;
-      return [word, weight];
+      const hits = questions.filter((question) => fit(question.words, word));
+      const rare = Math.log((questions.length + 1) / (hits.length + 0.5));
+      return [word, hits.length > 0 ? rare : UNKNOWN];
     });
     const total = weights.reduce((sum, [, weight]) => sum + weight, 0);
+    const shareOf = (known) =>
+      weights.reduce(
+        (sum, [word, weight]) => sum + weight * fit(known, word),
+        0,
+      ) / total;
     return questions
       .map((question) => {
-        const kept = weights.filter(([word]) => has(question.words, word));
-        const share = kept.reduce((sum, [, weight]) => sum + weight, 0) / total;
-        const inTitle = kept.filter(([word]) => has(question.own, word)).length;
-        return {
-          question,
-          score: share + 0.1 * inTitle - 0.002 * question.words.size,
-          share,
-        };
+        const share = shareOf(question.words);
+        const score =
+          share + 0.1 * shareOf(question.own) - 0.002 * question.words.size;
+        return { question, score, share };
       })
-      .filter(({ share }) => share > 0.5)
+      .filter(({ share }) => share > ENOUGH)
       .sort((one, other) => other.score - one.score)
       .slice(0, SHOWN)
       .map(({ question, score }) => [

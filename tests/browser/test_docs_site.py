@@ -87,7 +87,7 @@ QUESTIONS = {
     "response times": "how-to/export-data.html",
     "blink rate": "how-to/measure-blinks.html#what-you-get",
     "wink": "how-to/measure-blinks.html#what-you-get",
-    "300 recordings": "how-to/many-recordings.html",
+    "hundreds of recordings": "how-to/many-recordings.html",
     "tab closed": "how-to/troubleshooting.html#participants",
     "variable frame rate": "how-to/build-a-study.html#your-own-videos",
     "cite": "how-to/share-a-study.html#cite-palpebra",
