@@ -342,7 +342,7 @@ class StillFrames:
     numbers : list of int
         Frames of the video; the first is the open one, which all others are aligned on.
     closures : float64 array (n,)
-        As tracked, ascending, 0 for the first and 1 for the last.
+        As tracked, or once the frames are distinct ascending, 0 for the first and 1 for the last.
     pictures : list of float32 array (h, w, 3)
     points : float64 array (n, 9 * eyes, 2)
         Aligned landmarks in pixels of the region.
@@ -365,15 +365,19 @@ class StillFrames:
     still_db: Values
     region: Region = field(repr=False)
 
-    def without(self, k: int) -> "StillFrames":
-        """The same without one frame; what was measured of all frames stays."""
+    def only(self, kept: Sequence[int], closures: Values) -> "StillFrames":
+        """The same with some of the frames; what was measured of all frames stays."""
         return replace(
             self,
-            numbers=[*self.numbers[:k], *self.numbers[k + 1 :]],
-            closures=np.delete(self.closures, k),
-            pictures=[*self.pictures[:k], *self.pictures[k + 1 :]],
-            points=np.delete(self.points, k, axis=0),
+            numbers=[self.numbers[k] for k in kept],
+            closures=closures[kept],
+            pictures=[self.pictures[k] for k in kept],
+            points=self.points[kept],
         )
+
+    def without(self, k: int) -> "StillFrames":
+        """The same without one frame."""
+        return self.only([n for n in range(len(self.numbers)) if n != k], self.closures)
 
 
 LEAST_STILL = 0.08
@@ -406,7 +410,7 @@ def align_opening(
     px_per_mm: float,
     advance: Callable[[], None],
 ) -> StillFrames:
-    """Align the frames of an opening on its open one, even out their light, and sort them by closure.
+    """Align all frames of an opening on its open one and even out their light.
 
     Parameters
     ----------
@@ -445,7 +449,7 @@ def align_opening(
             brightness,
             decibels(error),
         )
-    chosen, closures = _thinned(track, opening)
+    chosen = list(reversed(opening.frames))
     # Matrices lead from the open frame to the others, and points go the other way.
     points = np.array(
         [
@@ -457,9 +461,8 @@ def align_opening(
         ]
     )
     head_mm, light, still_db = np.array([measures[n] for n in opening.frames]).T
-    return StillFrames(
-        chosen, closures, [moved[n] for n in chosen], points, head_mm, light, shear, still_db, region
-    )
+    pictures_moved, closures = [moved[n] for n in chosen], track.closures.mean(1)[chosen]
+    return StillFrames(chosen, closures, pictures_moved, points, head_mm, light, shear, still_db, region)
 
 
 def decibels(squared_error: float) -> float:
@@ -467,19 +470,22 @@ def decibels(squared_error: float) -> float:
     return float(10 * np.log10(255**2 / max(squared_error, 1e-6)))
 
 
-def _thinned(track: EyeTrack, opening: Opening) -> tuple[list[int], Values]:
-    """Frames from open to shut that differ in closure, and their closures from 0 to 1."""
-    closure = track.closures.mean(1)
-    path = np.minimum.accumulate(closure[opening.shut : opening.opened + 1])
-    path = (path - path[-1]) / (path[0] - path[-1])
-    chosen = [opening.opened]
-    values = [0.0]
-    for number in reversed(opening.frames[1:-1]):
-        value = float(path[number - opening.shut])
-        if value >= values[-1] + LEAST_STEP and value <= 1 - LEAST_STEP:
-            chosen.append(number)
-            values.append(value)
-    return [*chosen, opening.shut], np.array([*values, 1.0])
+def distinct_frames(frames: StillFrames, closures: Values) -> StillFrames:
+    """The frames that differ in closure, with closures from 0 to 1.
+
+    Parameters
+    ----------
+    closures : float64 array (n,)
+        Of all frames, from open to shut.
+    """
+    # Where the lid falls back on its way, the least closure so far counts.
+    path = np.minimum.accumulate(closures[::-1])[::-1]
+    path = (path - path[0]) / (path[-1] - path[0])
+    kept = [0]
+    for k in range(1, len(path) - 1):
+        if path[kept[-1]] + LEAST_STEP <= path[k] <= 1 - LEAST_STEP:
+            kept.append(k)
+    return frames.only([*kept, len(path) - 1], path)
 
 
 def _largest_shear(

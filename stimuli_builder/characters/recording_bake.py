@@ -3,7 +3,7 @@
 import base64
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from stimuli_builder.characters.recording import (
     StillFrames,
     Values,
     align_opening,
+    distinct_frames,
     find_openings,
     gaze_of,
     iris_scale,
@@ -37,10 +38,13 @@ from stimuli_builder.characters.recording_levels import (
     BuiltLevel,
     MeasuredLevels,
     build_levels,
+    frames_by_motion,
     measure_levels,
+    moved_levels,
     moving_crop,
     near_both_sides,
     rebuilt_frame,
+    tracked_openings,
     without_strangers,
     write_recorded_character,
 )
@@ -56,6 +60,8 @@ from stimuli_builder.video import Picture, VideoInfo, grey, read_frames, rgb
 TRACK_NAME, REPORT_NAME = "track.csv", "report.html"
 FISSURE_MM = 30.0
 """Width of an eye where no iris is seen to give the scale."""
+EARLIER_S = 0.12
+"""Without labels an eye may be shut so long before its last frame that is tracked as shut."""
 GAZES_LOOKED_AT = 12
 CHECKED_FRAMES = 40
 LEAST_LIKENESS = 0.5
@@ -87,6 +93,8 @@ class RecordingBake:
         Frames that did not fit their neighbors.
     left_out : float64 array (n,)
         dB of each recorded frame built from its neighbors; NaN at both ends.
+    labeled : bool
+        The tracker measured the openings, by a given track; else the motion of the lids did.
     limits : list of str
         What the result cannot do, and what to record again.
     """
@@ -102,7 +110,13 @@ class RecordingBake:
     usable: int
     dropped: int
     left_out: Values
+    labeled: bool
     limits: list[str]
+
+    @property
+    def measured_by(self) -> str:
+        """What measured the openings, in words."""
+        return "the tracker" if self.labeled else "the motion of the lids"
 
 
 def bake_recording(order: RecordingOrder) -> RecordingBake:
@@ -118,14 +132,11 @@ def bake_recording(order: RecordingOrder) -> RecordingBake:
         raise InputError(f"{order.out}: there is a character already; choose another folder or remove it")
     info = open_video(order.video, order.accept_variable_rate)
     check_folder(order.out)
-    model, path = _tracked(order, info)
+    path = order.track or _tracked(order, info)
     track = read_eye_track(path, info, order.one_eye)
     openings, refused = find_openings(track, info)
     opening = _choose(order, info, track, openings, refused)
-    # A given track brings no model, which the check of the openings needs.
-    if model is None:
-        model = _model_of(info, track)
-    baked = _bake(order, info, track, model, opening, len(openings), sum(refused.values()))
+    baked = _bake(order, info, track, opening, len(openings), sum(refused.values()))
     provenance: dict[str, object] = {
         "command": "stimuli bake recording",
         "recording": order.video.name,
@@ -143,10 +154,8 @@ def bake_recording(order: RecordingOrder) -> RecordingBake:
     return baked
 
 
-def _tracked(order: RecordingOrder, info: VideoInfo) -> tuple[CoupledModel | None, Path]:
-    """The track as given, or made without labels in the character's folder, with its model."""
-    if order.track is not None:
-        return None, order.track
+def _tracked(order: RecordingOrder, info: VideoInfo) -> Path:
+    """The track, made without labels in the character's folder."""
     with frame_progress() as progress:
         task = progress.add_task("finding eyes", total=info.frame_count)
         seen = survey(info, one_eye=order.one_eye, advance=lambda now: progress.update(task, completed=now))
@@ -160,7 +169,7 @@ def _tracked(order: RecordingOrder, info: VideoInfo) -> tuple[CoupledModel | Non
         track_video(
             lesson.model, info, path, lambda now: progress.update(task, completed=now.frames), seen.hints
         )
-    return lesson.model, path
+    return path
 
 
 def _model_of(info: VideoInfo, track: EyeTrack) -> CoupledModel:
@@ -277,12 +286,14 @@ def _bake(
     order: RecordingOrder,
     info: VideoInfo,
     track: EyeTrack,
-    model: CoupledModel,
     opening: Opening,
     usable: int,
     refused: int,
 ) -> RecordingBake:
     """Everything from the chosen opening to measured levels."""
+    shut = opening.shut
+    if order.track is None:
+        opening = replace(opening, shut=_earlier(track, shut, round(EARLIER_S * info.fps)))
     with frame_progress() as progress:
         task = progress.add_task("reading the blink", total=opening.opened + 1)
         pictures = read_selected(
@@ -295,14 +306,23 @@ def _bake(
     px_per_mm = video_px_per_mm * region.scale
     with step_progress("removing head motion", len(opening.frames) - 1) as advance:
         frames = align_opening(pictures, track, opening, info, region, px_per_mm, advance)
+    motion = None
+    if order.track is None:
+        motion = frames_by_motion(frames, opening.opened - shut, px_per_mm)
+    frames = distinct_frames(frames, frames.closures) if motion is None else motion.frames
     crop = moving_crop(frames.points[0], region.size_px)
     with step_progress("leaving frames out", len(frames.numbers) - 2) as advance:
         # Reflections, passing shadows and errors of compression make a frame a stranger among its neighbors.
         frames, left_out, dropped = without_strangers(frames, crop, advance)
     with step_progress("filling in levels", len(frames.numbers)) as advance:
         levels = build_levels(frames, crop, advance)
-    with step_progress("measuring openings", len(levels)) as advance:
-        measured = measure_levels(model, frames, levels, crop, gray, video_px_per_mm, advance)
+    if motion is None:
+        model = _model_of(info, track)
+        with step_progress("measuring openings", len(levels)) as advance:
+            seen = tracked_openings(model, frames, levels, crop, gray, advance)
+        measured = measure_levels(levels, seen, video_px_per_mm)
+    else:
+        measured = moved_levels(motion, levels, px_per_mm)
     # What is tracked of the shut eye is not part of it; see the limits.
     opening_mm = measured.opening_px / video_px_per_mm
     if not np.isfinite(opening_mm) or opening_mm <= 0:
@@ -321,11 +341,19 @@ def _bake(
         usable,
         dropped,
         left_out,
+        motion is None,
         [],
     )
     # Limits are judged on the finished bake, which is therefore made first.
     baked.limits.extend(limits_of(baked, track))
     return baked
+
+
+def _earlier(track: EyeTrack, shut: int, most: int) -> int:
+    """The first of up to so many frames before the shut one in which the eyes are not lost."""
+    first = max(0, shut - most)
+    lost = np.flatnonzero(np.isnan(track.points[first:shut]).any((1, 2)))
+    return first + int(lost[-1]) + 1 if len(lost) else first
 
 
 def _scale(order: RecordingOrder, track: EyeTrack, gray: NDArray[np.uint8], opening: Opening) -> float:
@@ -376,7 +404,7 @@ def limits_of(baked: RecordingBake, track: EyeTrack) -> Iterator[str]:
 
 def _limits_of_recording(baked: RecordingBake, track: EyeTrack) -> Iterator[str]:
     frames = baked.frames
-    if (floor := float((track.shut_px / track.open_px).max())) > FLOOR_SHARE:
+    if baked.labeled and (floor := float((track.shut_px / track.open_px).max())) > FLOOR_SHARE:
         yield (
             f"In shut eyes the tracker measures {floor:.0%} of the open eye's opening. Openings in this "
             "report count from there, so they do not say how far the eyes really shut. Label some shut "
@@ -414,7 +442,8 @@ def _limits_of_recording(baked: RecordingBake, track: EyeTrack) -> Iterator[str]
     off = baked.measured.worst_mm
     if off > TOLERANCE_MM:
         yield (
-            f"The tracked opening of a level differs by {off:.2f} mm from its closure. Label frames by hand."
+            f"The opening of a level, measured by {baked.measured_by}, differs by {off:.2f} mm from its "
+            "closure. Label frames by hand."
         )
 
 
@@ -553,7 +582,7 @@ def summary_lines(baked: RecordingBake, order: RecordingOrder) -> Sequence[str]:
         f"{order.out}: {len(baked.levels)} levels, {len(baked.frames.numbers)} of them recorded and "
         f"{between} interpolated; {counted(baked.usable, 'usable blink')} of {baked.blinks}",
         f"left-out frames: median {np.median(known):.1f} dB{least}; opening within "
-        f"{baked.measured.worst_mm:.2f} mm by the tracker",
+        f"{baked.measured.worst_mm:.2f} mm by {baked.measured_by}",
         *(f"limit: {limit}" for limit in baked.limits),
         f"{order.out / REPORT_NAME}: what is recorded, what is interpolated and how well",
     ]

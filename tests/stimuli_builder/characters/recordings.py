@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stimuli_builder.characters.colour import linear_to_srgb
-from stimuli_builder.clips.characters import find_character
+from stimuli_builder.clips.characters import find_character, geometry
 from stimuli_builder.clips.frames import regions_of
 from stimuli_builder.clips.kernels import FULL_SCALE
 from stimuli_builder.clips.levels import LevelSet
@@ -68,14 +68,17 @@ class Recording:
     readout_s: float = 0.0
     glasses: bool = False
     seed: int = 3
+    face: str = "alder@8"
+    """Exact landmarks are known of this one alone; a detector sees faces from forehead to chin."""
 
     @property
     def scale(self) -> float:
         return self.width_px / 960
 
-    @property
+    @cached_property
     def size_px(self) -> tuple[int, int]:
-        return self.width_px, self.width_px * 3 // 8
+        width, height = geometry(self.face).size_px
+        return self.width_px, 2 * round(self.width_px * height / width / 2)
 
     @cached_property
     def frame_count(self) -> int:
@@ -87,7 +90,7 @@ class Recording:
 
     @cached_property
     def character(self) -> LevelSet:
-        return find_character("alder@8").levels(self.size_px)
+        return find_character(self.face).levels(self.size_px)
 
     @cached_property
     def regions(self) -> EyeRegions:
