@@ -1,8 +1,9 @@
-"""Tracking of real recordings against their labels: without labels, by labels, with reflections on glasses.
+"""Recordings against their labels: without labels, by labels, with reflections; characters without labels.
 
     python -m bench.recordings label-free [FOLDER]
     python -m bench.recordings label-error [FOLDER]
     python -m bench.recordings reflections [FOLDER]
+    python -m bench.recordings characters
 
 label-free: FOLDER (../shared/data/face_video) holds NAME.mp4 and NAME.points.json. Distances are means over
 lid points from the labeled lid curve, as part of the eye's width; 'worse eye' takes the worse of both in
@@ -22,6 +23,9 @@ as a reflection on glasses does when the head turns. Reported for the quarter of
 closed: the opening in percent of the eye's width by the labels, by the detector and by the track, how many
 are called doubtful, and how many percent of the pixels between the lids are saturated, there and in all
 frames. Needs the detector's environment, made at first use.
+
+characters: `stimuli bake recording` without labels on rendered faces. The closure of every recorded frame is
+compared with the one it was rendered at, in mm of the opening.
 """
 
 import sys
@@ -35,6 +39,8 @@ import numpy as np
 
 from bench.harness import RECORDINGS, run_part, say
 from bench.lid_events import METHODS, counts
+from stimuli_builder.characters.atlas import SHIPPED, load_atlas
+from stimuli_builder.characters.recording_bake import RecordingOrder, bake_recording
 from stimuli_builder.tracking.accuracy import cross_validate
 from stimuli_builder.tracking.certainty import lid_difference, lid_offsets
 from stimuli_builder.tracking.labelfree import label_free_lesson
@@ -45,6 +51,7 @@ from stimuli_builder.tracking.survey import survey
 from stimuli_builder.tracking.table import numbers, point_columns, track_rows
 from stimuli_builder.tracking.track import track_video
 from stimuli_builder.video import Picture, VideoInfo, VideoWriter, frames, read_frames, rgb, scan_video
+from tests.stimuli_builder.characters.recordings import Recording
 
 CLIPS = {"single_face": False, "short_human_3blink": True}
 BLINKS = {"single_face": [(23, 34)], "short_human_3blink": [(15, 44), (131, 155), (203, 222)]}
@@ -264,7 +271,34 @@ def measure_reflections() -> None:
                 )
 
 
+GENERATED = (
+    Recording(face="alder-face@2", width_px=720),
+    Recording(face="alder-face@2", width_px=480, fps=120, light=0.1, noise=2.5, seed=12, crf=20),
+    Recording(face="alder-face@2", width_px=900, fps=120, light=0.12, noise=2, seed=21, crf=20),
+    Recording(face="cedar-face@2", width_px=720, light=0.15, noise=2, seed=11, crf=18),
+    Recording(face="cedar-face@2", width_px=1080, light=0.05, noise=1.5, seed=18, crf=18),
+    Recording(face="cedar-face@2", width_px=600, fps=60, seconds=2.2, onsets=(0.3, 1.2), noise=3, seed=22),
+)
+
+
+def measure_characters() -> None:
+    for recording in GENERATED:
+        with tempfile.TemporaryDirectory() as bare:
+            video, _ = recording.write(Path(bare))
+            baked = bake_recording(RecordingOrder(video, Path(bare) / "made"))
+        true_mm = load_atlas(SHIPPED / recording.face).declaration.opening_mm
+        recorded = [k for k, level in enumerate(baked.levels) if level.first == level.second]
+        off = (baked.measured.closures[recorded] - recording.closure[baked.frames.numbers]) * true_mm
+        say(
+            f"{recording.face}, {recording.width_px} px, {recording.fps:g} fps, seed {recording.seed}: "
+            f"closures {off.min():+.2f} to {off.max():+.2f} mm off, RMS {np.sqrt((off**2).mean()):.2f}; "
+            f"widest opening {baked.opening_mm - true_mm:+.2f} mm; left-out frames at least "
+            f"{np.nanmin(baked.left_out):.1f} dB"
+        )
+
+
 PARTS = {
+    "characters": measure_characters,
     "label-free": measure_label_free,
     "label-error": measure_label_error,
     "reflections": measure_reflections,

@@ -68,6 +68,7 @@ class Recording:
     readout_s: float = 0.0
     glasses: bool = False
     seed: int = 3
+    crf: int = 12
     face: str = "alder@8"
     """Exact landmarks are known of this one alone; a detector sees faces from forehead to chin."""
 
@@ -166,7 +167,7 @@ class Recording:
     def write(self, folder: Path, name: str = "person") -> tuple[Path, Path]:
         """Write video and track; returns both paths."""
         video, track = folder / f"{name}.mp4", folder / f"{name}.csv"
-        with VideoWriter(video, self.fps, self.size_px, crf=12) as writer:
+        with VideoWriter(video, self.fps, self.size_px, crf=self.crf) as writer:
             for picture in self.pictures():
                 writer.write(picture)
         self.write_track(track)

@@ -87,7 +87,7 @@ def test_openings_without_labels_are_those_of_the_lids(tmp_path: Path) -> None:
     # The detector's lids were up to 1.8 mm off here.
     assert np.abs(off).max() * 10.07 <= 0.3
     assert baked.opening_mm == pytest.approx(10.07, abs=0.3)
-    assert "were up to" in (tmp_path / "made" / "report.html").read_text(encoding="utf-8")
+    assert "without labels" in (tmp_path / "made" / "report.html").read_text(encoding="utf-8")
 
 
 EXPERIMENT = """
@@ -268,5 +268,6 @@ def test_without_a_track_the_command_tracks_first(
     said = capsys.readouterr().out
     assert "left-out frames: median" in said
     assert "by the motion of the lids" in said
+    assert "limit: Openings were measured without labels" in said
     assert (out / "track.csv").is_file()
     assert (out / "report.html").is_file()
