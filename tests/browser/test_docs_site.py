@@ -62,7 +62,7 @@ QUESTIONS = {
     "cost": "explanation/limits.html#cost-license-and-support",
     "maximum size of a clip": "explanation/limits.html#how-long-how-large-how-many",
     "uninstall": "how-to/install.html#uninstall",
-    "forgot password": "how-to/accounts.html",
+    "forgot password": "how-to/accounts.html#forgot-your-password",
     "port in use": "how-to/troubleshooting.html#setup-and-start",
     "nightly backups": "how-to/back-up-and-restore.html#back-up",
     "typo in a question": "how-to/change-a-running-study.html",
