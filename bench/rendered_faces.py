@@ -2,6 +2,7 @@
 
     python -m bench.rendered_faces iris KIT.npz [every, 8]
     python -m bench.rendered_faces close-up KIT.npz [FOLDER] [FACES, 2]
+    python -m bench.rendered_faces sheet RECORDING.mp4 OUT.webp NAME ...
 
 iris: KIT is ICT-FaceKit's packed file. The lids' points are the true ones with 1.5% of
 the eye's width of noise. Errors in percent of the eye's width (middle) and of the true diameter.
@@ -14,6 +15,10 @@ correlation of the lid distance; height of the widest opening compared with the 
 was looked for and read. FACES are so many of the rendered faces (6 at most, 0: recordings alone): two are a
 sample, since all six did not end within an hour on two busy cores. The recordings come first, and each line
 is printed as soon as it is known. Needs the detector's environment, made at first use.
+
+sheet: draws the left eye of some characters next to a real one at the same size, at four closures.
+RECORDING is tests/testdata/short_human_3blink.mp4 of https://github.com/simonarvin/eyeloop (commit
+cd22fb7, GPL-3.0), whose license allows pictures of its frames with credit and a link.
 """
 
 import sys
@@ -29,10 +34,12 @@ from face_baking.scene import FaceScene
 from face_baking.training.draw import SamplePose
 from face_baking.training.labels import labels_of
 from face_baking.training.scene import SampleScene
+from PIL import Image
 
 from bench.harness import RECORDINGS, run_part
 from stimuli_builder.characters.atlas import SHIPPED, load_atlas
 from stimuli_builder.characters.colour import linear_to_srgb
+from stimuli_builder.clips.characters import find_character
 from stimuli_builder.tracking.certainty import lid_offsets
 from stimuli_builder.tracking.detector.detection import eye_points
 from stimuli_builder.tracking.detector.mesh import open_detector
@@ -184,7 +191,43 @@ def measure_close_ups() -> None:
             say_close_up(clip)
 
 
+REAL_CLOSURES = {0.0: 60, 0.35: 216, 0.6: 32, 1.0: 26}
+"""Frames of the recording by closure, from its labels: 0, 0.34, 0.60 and 0.98."""
+REAL_MIDDLE_PX, REAL_PX_PER_MM = (349, 259), 16.4
+"""Middle of the open iris and size, from the iris' outline: 11.7 mm wide."""
+TILE_MM, TILE_PX_PER_MM, EYE_ABOVE_MM = (36.0, 22.0), 10.0, 4.3
+
+
+def cut_tile(picture: Picture, middle_px: tuple[float, float], px_per_mm: float) -> Picture:
+    """The picture about an eye, TILE_MM wide and high."""
+    scale = TILE_PX_PER_MM / px_per_mm
+    size = tuple(round(mm * TILE_PX_PER_MM) for mm in TILE_MM)
+    away = np.array(size) / 2 - scale * np.array(middle_px)
+    matrix = np.array([[scale, 0, away[0]], [0, scale, away[1]]])
+    flags = cv2.INTER_CUBIC if scale > 1 else cv2.INTER_AREA
+    return np.asarray(cv2.warpAffine(picture, matrix, size, flags=flags, borderMode=cv2.BORDER_REPLICATE))
+
+
+def eye_column(name: str) -> list[Picture]:
+    """The left eye of a character at each closure."""
+    character = find_character(name)
+    declared = character.geometry
+    levels, (width, height) = character.levels(declared.size_px), declared.size_px
+    scale = declared.px_per_mm
+    middle = width / 2 + declared.inter_ocular_mm / 2 * scale, height / 2 + EYE_ABOVE_MM * scale
+    return [cut_tile(levels.picture(closure), middle, scale) for closure in REAL_CLOSURES]
+
+
+def draw_sheet() -> None:
+    recording, out, names = Path(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:]
+    shown = {n: picture.copy() for n, picture in enumerate(frames(recording, read=rgb))}
+    real = [cut_tile(shown[n], REAL_MIDDLE_PX, REAL_PX_PER_MM) for n in REAL_CLOSURES.values()]
+    columns = [np.vstack(column) for column in (real, *map(eye_column, names))]
+    Image.fromarray(np.hstack(columns)).save(out, quality=75, method=6)
+
+
 PARTS = {
+    "sheet": draw_sheet,
     "iris": measure_irises,
     "close-up": measure_close_ups,
 }

@@ -11,6 +11,8 @@ INTER_OCULAR_MM = 60.0
 DISTANCE_CM = 65.0
 PLANE_Z_CM = 9.0
 _BOX_MARGIN_MM, _FEATHER_MM = 1.6, 1.4
+_NOSE_MM = 9.2
+"""Half width of the bridge of the nose, which no blink changes: renders of it differ in noise and faint shade."""
 Box = tuple[int, int, int, int]
 """x, y, width, height in px, from the upper left."""
 
@@ -79,10 +81,10 @@ class View:
     def feather(self, box: Box) -> np.ndarray:
         """(h, w, 1) weight of a box's picture over the still frame: 0 on its rim, 1 inside."""
         ramp = max(_FEATHER_MM * self.px_per_mm, 1.0)
-        sides = []
-        for length in (box[3], box[2]):
-            inset = np.minimum(np.arange(length), np.arange(length)[::-1])
-            sides.append(0.5 - 0.5 * np.cos(np.pi * np.clip(inset / ramp, 0, 1)))
+        insets = [np.minimum(np.arange(length), np.arange(length)[::-1]) for length in (box[3], box[2])]
+        from_nose = np.abs(box[0] + np.arange(box[2]) - self.size_px[0] / 2) - _NOSE_MM * self.px_per_mm
+        insets[1] = np.minimum(insets[1], from_nose)
+        sides = [0.5 - 0.5 * np.cos(np.pi * np.clip(inset / ramp, 0, 1)) for inset in insets]
         return np.outer(*sides)[..., None].astype(np.float32)
 
 

@@ -235,6 +235,16 @@ def test_the_eyes_lie_60_mm_apart_and_the_rest_holds_still(scene: FaceScene) -> 
     assert max(moved["brow"], moved["cheek"], abs(moved["lower_lid_nasal"])) < 0.05
 
 
+def test_no_blink_changes_the_bridge_of_the_nose(scene: FaceScene) -> None:
+    """Cedar's corners are so near it that noise and faint shade reached to 8.7 mm from its middle."""
+    x, y, width, height = scene.boxes["left"]
+    wide = (scene.view.size_px[0] // 2, y, x + width - scene.view.size_px[0] // 2, height)
+    weight = scene.view.feather(wide)[height // 2, :, 0]
+    away_mm = (wide[0] + np.arange(wide[2]) - scene.view.size_px[0] / 2) / scene.view.px_per_mm
+    assert weight[away_mm < 9].max() == 0
+    assert weight[(away_mm > 12) & (away_mm < 40)].min() == 1
+
+
 def test_everything_moves_in_one_fixed_topology(scene: FaceScene) -> None:
     for opened, shut in zip(scene.parts(LidPose(0.0)), scene.parts(LidPose(0.6, 1.0, 3.0)), strict=True):
         assert opened.name == shut.name
