@@ -180,6 +180,14 @@ def _write_tables(folder: Path, draw: random.Random) -> None:
     for person in PARTICIPANTS:
         wide.active.append([person, *(draw.randint(1, 7) for _ in range(4))])
     wide.save(folder / "wide.xlsx")
+    times = "".join(
+        f"p{person},{person % 7 + 1},{person * 3 % 7 + 1},{person * 5 % 7 + 1}\n" for person in range(12)
+    )
+    (folder / "times.csv").write_text(f"id,t1,t2,t3\n{times}")
+    speeds = "".join(
+        f"p{person},{20 + person},{person % 7 + 1},{person * 3 % 7 + 1}\n" for person in range(12)
+    )
+    (folder / "speeds.csv").write_text(f"id,age,slow,fast\n{speeds}")
     # Eyes open 0.3 of their width, blinking every 3 s for 200 ms, at 240 frames per second.
     time_s = np.arange(0, 30, 1 / 240)
     closure = np.clip(1 - np.abs((time_s % 3) - 1.5) / 0.1, 0, 1) ** 0.7
