@@ -84,7 +84,7 @@ def export(
         bool,
         typer.Option(
             "--old-order",
-            help=("Use the column order of versions up to 0.2; by default, columns are in logical order."),
+            help=("Use the column order of version 0.1; by default, columns are in logical order."),
         ),
     ] = False,
     scripts: Annotated[

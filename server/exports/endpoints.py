@@ -80,9 +80,7 @@ Series = Annotated[
 ]
 OldOrder = Annotated[
     bool,
-    Query(
-        description="Use the column order of versions up to 0.2; by default, columns are in logical order."
-    ),
+    Query(description="Use the column order of version 0.1; by default, columns are in logical order."),
 ]
 
 

@@ -74,7 +74,7 @@ def bake_face(
     ] = None,
     light: Annotated[str, typer.Option(help="Light preset: studio or window.")] = "studio",
     identities: Annotated[
-        Path, typer.Option(help="Identities file, to bake your own face.")
+        Path, typer.Option(help="Identities file, to bake your own face.", show_default="the shipped one")
     ] = IDENTITIES_FILE,
     work: Annotated[
         Path, typer.Option(help=("Folder of rendered levels, from which a stopped bake resumes."))
