@@ -97,8 +97,9 @@ def corner_floor(
     height += nasal * (_FLESH_HIGH_CM * flesh + _PLICA_HIGH_CM * plica) * (1 - 0.5 * stroke)
     above = _FLOOR_SOFT_CM * np.logaddexp(0, height / _FLOOR_SOFT_CM)
     angle, uv = _eye_uv(path, side, stroke, points.reshape(-1, 3))
-    # Below the white before the iris's rim, where the white itself sinks.
-    sunk = (0.004 + 0.06 * smooth(0.65, 0.48, angle)).reshape(height.shape)
+    # Below the white before the iris's rim, and below the iris itself: before it, its end was a dark line.
+    sunk = 0.004 + 0.06 * smooth(0.65, 0.48, angle) + 0.4 * smooth(0.48, 0.41, angle)
+    sunk = sunk.reshape(height.shape)
     out *= ((globe.radius + above - sunk - 0.15 * ~front) / radius)[..., None]
     vertices = (globe.centre + out).reshape(-1, 3)
     whole = np.ones(len(vertices))

@@ -12,7 +12,7 @@ DISTANCE_CM = 65.0
 PLANE_Z_CM = 9.0
 _BOX_MARGIN_MM, _FEATHER_MM = 1.6, 1.4
 _NOSE_MM = 9.2
-"""Half width of the bridge of the nose, which no blink changes: renders of it differ in noise and faint shade."""
+"""Half width of the bridge of the nose, which no blink changes: its renders differ by noise and shade."""
 Box = tuple[int, int, int, int]
 """x, y, width, height in px, from the upper left."""
 

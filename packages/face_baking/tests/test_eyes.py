@@ -65,6 +65,9 @@ def test_the_corners_floor_runs_into_the_white(path: BlinkPath, side: int) -> No
     out = floor.vertices - path.globes[side].centre
     height, beside = np.linalg.norm(out, axis=1) - path.globes[side].radius, np.abs(out[:, 0])
     assert height[beside < IRIS_CM + 0.02].max() < 0
+    before_iris = np.linalg.norm(out[:, :2], axis=1) < 0.9 * IRIS_CM
+    assert before_iris.any()
+    assert height[before_iris].max() < -0.3
     assert height[(beside > 1.25) & (out[:, 0] * side < 0)].max() > 0.05
 
 
