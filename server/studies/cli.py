@@ -9,6 +9,7 @@ import typer
 from rich.table import Table
 from sqlalchemy.orm import Session
 
+from experiments.checks import CHECK_CELL
 from experiments.command_groups import command_group
 from experiments.errors import InputError, did_you_mean
 from experiments.load import locate
@@ -141,7 +142,8 @@ def _same_version(session: Session, study: Study, sha256: str, manifest: Manifes
         return None
     version = active_version(session, study)
     known = {(clip.cell, clip.exemplar, clip.clip_sha256) for clip in version.clips}
-    same = version.definition_sha256 == sha256 and known == content_of(manifest.clips)
+    checks = {(CHECK_CELL, check.number, check.sha256) for check in manifest.checks}
+    same = version.definition_sha256 == sha256 and known == content_of(manifest.clips) | checks
     return version if same and sizes_of(manifest) == sizes_of_version(version) else None
 
 

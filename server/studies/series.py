@@ -133,7 +133,8 @@ def effects_of_edit(
             ("/".join(clip.levels.get(name, "") for name in order), clip.exemplar, clip.clip_sha256)
             for clip in places
         }
-    series = series_for(study, experiment, clips)
+    # Clips that stay keep their sizes; those of other clips are known once they are saved.
+    series = series_for(study, experiment, clips, None if places is not None else sizes_of_version(present))
     runs = repository.run_count_of_series(session, study, present.series)
     changes = [
         ChangeOut(path=change.path, effect=change.effect, text=str(change))
@@ -243,10 +244,12 @@ def compare_versions(
     changes = difference(definition_of(before), definition_of(after))
     old_clips, new_clips = (repository.clips_by_exemplar(session, version) for version in (before, after))
     clips = list(_clips(old_clips, new_clips))
+    is_sized = definition_of(after).display.calibrate != "off"
+    resized = is_sized and sizes_of_version(before) != sizes_of_version(after)
     return Comparison(
         old=_side(before),
         new=_side(after),
-        pooled=not clips and not changes_what_is_measured(changes),
+        pooled=not clips and not resized and not changes_what_is_measured(changes),
         keys=[_key(change) for change in changes],
         clips=clips[:MAX_CLIPS_LISTED],
         clips_differing=len(clips),

@@ -13,13 +13,16 @@ from experiments.declaration.clip_rating import SCALE_NAME
 from experiments.kinds.clip_rating import RATINGS
 from experiments.load import parse_experiment
 from experiments.manifest import MADE_ELSEWHERE, UPLOADED
+from server.accounts.identity import OPERATOR
 from server.context import Services
 from server.core.settings import Settings
 from server.core.values import now
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
 from server.participation.tally_pools import pooled_tally
 from server.results.repository import Pool
+from server.studies.series import compare_versions, effects_of_edit
 from tests.helpers.databases import BACKENDS, run_server_command
+from tests.helpers.motion_checks import checked
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 from tests.helpers.tiny_clips import make_clip_folder
 
@@ -99,6 +102,22 @@ def test_another_size_of_the_same_clips_makes_a_version_and_a_series(
     assert "nothing new" in add(settings, sources).stdout
     with services.database.read() as session:
         assert [version.series for version in session.query(StudyVersion)] == [1, 2]
+        study = session.query(Study).one()
+        definition = parse_experiment(SHORT)
+        assert effects_of_edit(session, study, definition).series == 2
+        study.active_version = 1
+        assert effects_of_edit(session, study, definition).series == 1
+        comparison = compare_versions(session, ("short", 1), ("short", 2), OPERATOR)
+        assert (comparison.clips, comparison.keys, comparison.pooled) == ([], [], False)
+
+
+def test_adding_motion_checks_again_changes_nothing(settings: Settings, sources: Path) -> None:
+    text = checked(SHORT)
+    (sources / "short.toml").write_text(text)
+    make_clip_folder(parse_experiment(text), sources / "clips")
+    first = add(settings, sources)
+    assert "version 1" in first.stdout, first.stderr
+    assert "version 1, nothing new" in add(settings, sources).stdout
 
 
 def test_an_archived_study_is_not_changed_from_the_command_line(
