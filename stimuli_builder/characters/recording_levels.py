@@ -253,8 +253,10 @@ BELOW_MARGIN = (0.02, 0.05)
 TOUCHING = 0.01
 """Lids that are apart by less than this share of the opening are taken to touch."""
 MIN_FRAMES = 2
+"""Of an opening, after the open one: the least that shows a lid on its way."""
 RIM_MM = 0.25
 """Lids that touch at their lashes have met behind them: so much of the motion closes no gap that is seen."""
+NOT_FOLLOWED = "the motion of the lids cannot be followed in the blink; label frames by hand"
 
 
 class LidMotion:
@@ -309,6 +311,11 @@ def lid_travel(pictures: Sequence[Picture], opened: Points, shut: Points, start:
         Aligned, gray; the first is the open one.
     opened, shut : float64 array (9 * eyes, 2)
         Detected points in the first picture, and in picture `start`, whose eyes are nearly shut.
+
+    Raises
+    ------
+    InputError
+        No upper lid rises over a lower one that stays behind.
     """
     upper, below, drift = [], [], []
     for eye, shut_eye in zip(opened.reshape(-1, EYE_POINTS, 2), shut.reshape(-1, EYE_POINTS, 2), strict=True):
@@ -326,11 +333,16 @@ def lid_travel(pictures: Sequence[Picture], opened: Points, shut: Points, start:
             places = motion.places(deepest, grid)
             moved = np.median((places - grid) @ down, axis=2)
             highest = int(np.argmin(moved[0]))
+            if not moved[0, highest] < 0:
+                raise InputError(NOT_FOLLOWED)
             meets = highest + int(np.argmax(moved[0, highest:] > 0.5 * moved[0, highest]))
             last_row = int(np.flatnonzero(moved[0] <= MARGIN_SHARE * moved[0, highest])[-1])
             margin = slice(max(highest, last_row - MARGIN_ROWS + 1), last_row + 1)
             under = LID_ROWS - LID_ROWS[meets]
-            lower = moved[:, (under >= BELOW_MARGIN[0]) & (under <= BELOW_MARGIN[1])].mean(1)
+            touched = (under >= BELOW_MARGIN[0]) & (under <= BELOW_MARGIN[1])
+            if not touched.any():
+                raise InputError(NOT_FOLLOWED)
+            lower = moved[:, touched].mean(1)
             rows = moved[:, margin].mean(1)
             deepest = int(np.argmax(rows))
             center = center + (LID_ROWS[meets] * width + moved[deepest, meets]) * down
@@ -395,7 +407,7 @@ def frames_by_motion(frames: StillFrames, start: int, px_per_mm: float) -> Motio
     travel = lid_travel(pictures, frames.points[0], frames.points[start], start)
     opening, touching = moved_openings(travel, px_per_mm)
     if not opening[0] > 0 or touching < MIN_FRAMES:
-        raise InputError("the motion of the lids cannot be followed in the blink; label frames by hand")
+        raise InputError(NOT_FOLLOWED)
     closures = 1 - opening[: touching + 1] / opening[0]
     distinct = distinct_frames(frames.only(range(touching + 1), closures), closures)
     errors = [travel.drift[frames.numbers.index(number)] / 2 for number in distinct.numbers]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from stimuli_builder.characters.atlas import load_atlas
 from stimuli_builder.characters.recording_bake import RecordingBake, RecordingOrder, bake_recording
-from stimuli_builder.characters.recording_levels import near_both_sides
+from stimuli_builder.characters.recording_levels import lid_travel, near_both_sides
 from stimuli_builder.cli import main
 from stimuli_builder.clips.build import Machines, build
 from stimuli_builder.clips.design_clips import Options
@@ -88,6 +89,16 @@ def test_openings_without_labels_are_those_of_the_lids(tmp_path: Path) -> None:
     assert np.abs(off).max() * 10.07 <= 0.3
     assert baked.opening_mm == pytest.approx(10.07, abs=0.3)
     assert "without labels" in (tmp_path / "made" / "report.html").read_text(encoding="utf-8")
+
+
+def test_eyes_that_do_not_open_are_refused() -> None:
+    noise = np.random.default_rng(0).random((240, 320)).astype(np.float32)
+    picture = cv2.normalize(cv2.GaussianBlur(noise, (0, 0), 3), None, 0, 255, cv2.NORM_MINMAX)  # type: ignore[call-overload]
+    pictures = [np.roll(picture.astype(np.uint8), -3 * number, 0) for number in range(5)]
+    lids = [(130, 105), (160, 100), (190, 105), (130, 132), (160, 138), (190, 132)]
+    points = np.array([(100, 120), *lids[:4], (220, 120), *lids[4:], (160, 120)], dtype=float)
+    with pytest.raises(InputError, match="motion of the lids cannot be followed"):
+        lid_travel(pictures, points, points, 4)
 
 
 EXPERIMENT = """
