@@ -55,8 +55,9 @@ def compared_by(differences: "Sequence[Difference]") -> str:
     tests += ["between groups by Welch's t tests"] * (not all(paired))
     if not tests:
         return ""
-    twice = [counted(one.left_out, "participant") for one in differences if one.left_out]
-    without = f", without {' and '.join(dict.fromkeys(twice))} who took part in both groups" if twice else ""
+    most = max(one.left_out for one in differences)
+    up_to = "up to " if any(one.left_out < most and not one.paired for one in differences) else ""
+    without = f", without {up_to}{counted(most, 'participant')} who took part in both groups" if most else ""
     return f"Series are compared {' and '.join(tests)}{without}, Holm-corrected. "
 
 

@@ -158,8 +158,8 @@ METHODS = (
     "Cell means are unweighted means of a participant's trials. Participants with an empty cell are "
     "excluded and listed. Effects are tested on orthonormal contrasts of the cell means. Multivariate: "
     "Hotelling's T², exact F on (q, N − q) df. Univariate: corrected by Greenhouse-Geisser and Huynh-Feldt. "
-    "The F reported first is the exact multivariate F if every effect has one and the plan does not request "
-    "the univariate F. Otherwise it is the univariate F with Greenhouse-Geisser df, for all effects. "
+    "The F reported first is the exact multivariate F if every effect has one and the univariate F "
+    "was not requested. Otherwise it is the univariate F with Greenhouse-Geisser df, for all effects. "
     "Marginal means and their errors are computed from each participant's marginal means. Pairs are "
     "compared by t tests, paired within participants."
 )

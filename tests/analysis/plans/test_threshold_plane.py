@@ -173,6 +173,7 @@ def test_a_person_in_both_of_two_groups_is_left_out_of_their_comparison() -> Non
     shared = differences([("s1", first | {"x": 40.0}), ("s2", second | {"x": -3.0})])
     assert shared == (replace(apart[0], left_out=1),)
     assert "without 1 participant who took part in both groups" in compared_by(shared)
+    assert "without up to 1 participant who" in compared_by((*apart, *shared))
 
 
 GROUPS = {True: ({"s1", "s2"},), False: ({"s1", "s2"}, {"s3", "s4"}, {"s1", "s4"})}
