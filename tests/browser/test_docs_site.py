@@ -93,7 +93,7 @@ QUESTIONS = {
     "cite": "how-to/share-a-study.html#cite-palpebra",
     "Mac": "how-to/install.html#windows-and-macos",
 }
-"""Words and the heading that must be listed first: a question of the page How do I ...?"""
+"""Words and the heading that must be first or second in the list: a question of the page How do I ...?"""
 
 
 @pytest.fixture
@@ -158,7 +158,7 @@ def test_search_lists_the_guide_for_a_task_among_the_first(
     page.close()
 
 
-def test_search_lists_the_heading_that_answers_a_question_first(
+def test_search_lists_the_heading_that_answers_a_question_at_the_top(
     docs_server: ServerProcess, chromium: Browser
 ) -> None:
     page = chromium.new_page()
