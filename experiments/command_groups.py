@@ -90,7 +90,23 @@ NEAR = 0.7
 
 
 class WholeExamplesCommand(TyperCommand):
-    """A command whose examples can be pasted from its help; Typer would break them within an option."""
+    """A command whose examples can be pasted from its help; Typer would break them within an option.
+
+    An option that takes one value is refused when it is given twice: Typer would ignore the first.
+    """
+
+    def make_parser(self, ctx: Any) -> Any:
+        """Make the parser, which names an option given twice."""
+        parser = super().make_parser(ctx)
+        parse = parser.parse_args
+
+        def parse_once(args: list[str]) -> Any:
+            found = parse(args)
+            _refuse_twice(ctx, found[2])
+            return found
+
+        parser.parse_args = parse_once  # type: ignore[method-assign]
+        return parser
 
     def format_help_text(self, ctx: Any, formatter: Any) -> None:
         """Write the help, its examples broken before options as a shell reads them."""
@@ -100,6 +116,16 @@ class WholeExamplesCommand(TyperCommand):
         )
         super().format_help_text(ctx, formatter)
         self.help = given
+
+
+def _refuse_twice(ctx: Any, given: list[Any]) -> None:
+    for option in given:
+        if option.param_type_name != "option" or option.multiple or option.is_flag or option.count:
+            continue
+        if given.count(option) > 1:
+            name = option.opts[0]
+            commas = f" Separate several by commas: {name} a,b." if "commas" in (option.help or "") else ""
+            ctx.fail(f"{name} is given {given.count(option)} times; give it once.{commas}")
 
 
 class CommandApp(typer.Typer):

@@ -181,8 +181,9 @@ DOCS_NOT_BUILT = """<!doctype html>
 <title>Documentation</title>
 <meta http-equiv="refresh" content="10">
 <h1>The documentation is not ready</h1>
-<p>After <code>make run</code> it is built in the background. This page looks for it every ten seconds.
-If it does not appear within two minutes, type <code>make docs</code> in the checkout to see why.
+<p>In a checkout, <code>make run</code> builds it in the background; this page looks for it every ten seconds.
+If it does not appear within two minutes, <code>build/docs.log</code> says why, and <code>make docs</code>
+builds it again. A container is made without it.
 You can also read the files in its folder <code>docs</code>.</p>
 </html>
 """

@@ -260,8 +260,8 @@ def lengthen(path: Path, pattern: str, rating: str, kept: Sequence[str] = ()) ->
     }
     if len(levels) == len(header):
         raise InputError(
-            f"'{pattern}' fits every column of {path.name}, so none says who rated; name those that stay: "
-            f"--keep {header[0]}"
+            f"'{pattern}' fits every column of {path.name}, so none says who rated; if one of them does, "
+            "keep it, as in --keep id"
         )
     if not levels:
         raise InputError(f"no column of {path.name} fits '{pattern}'; its columns: {', '.join(header)}")

@@ -35,9 +35,9 @@ class SeriesFit:
 class Difference:
     """An estimate of two series compared; p corrected by Holm over all pairs of series.
 
-    Within people by a paired t test where at least half of the smaller series' people have both; else between
-    groups of people by Welch's, without the `left_out` people who have both: their estimates are not
-    independent.
+    Within people by a paired t test where more than half of the smaller series' people have both; else
+    between groups of people by Welch's, without the `left_out` people who have both: their estimates are
+    not independent.
     """
 
     first: str
@@ -76,7 +76,7 @@ def _compared(
     """
     (label, first), (other_label, second) = one, other
     both = sorted(first.keys() & second.keys())
-    paired = 2 * len(both) >= max(min(len(first), len(second)), 1)
+    paired = 2 * len(both) > min(len(first), len(second))
     if paired:
         gaps = np.array([first[name] - second[name] for name in both])
         # Without variance the t test would divide by zero.

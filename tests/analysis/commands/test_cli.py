@@ -63,6 +63,19 @@ def test_run_finds_the_default_database(tmp_path, monkeypatch) -> None:
     assert "no ratings of experiment 'exp3' in a study 'foo'" in elsewhere.stderr
 
 
+def test_an_option_given_twice_is_refused(tmp_path) -> None:
+    """Only the last one would count: another design than the one that was asked for."""
+    (tmp_path / "t.csv").write_text(LONG)
+    command = ("anova", tmp_path / "t.csv", "--participant", "id", "--rating", "y")
+    twice = call(*command, "--within", "face", "--within", "blur")
+    assert twice.exit_code == 2
+    assert (
+        "--within is given 2 times; give it once. Separate several by commas: --within a,b." in twice.stderr
+    )
+    repeatable = ("--levels", "face=f2,f1,f0", "--levels", "blur=b0,b1")
+    assert call(*command, "--within", "face,blur", *repeatable).exit_code == 0
+
+
 def test_anova_reports_the_univariate_test_first_where_asked(tmp_path) -> None:
     (tmp_path / "t.csv").write_text(LONG)
     command = ("anova", tmp_path / "t.csv", "--participant", "id", "--rating", "y", "--within", "face")

@@ -172,6 +172,11 @@ def test_a_person_in_both_of_two_groups_is_left_out_of_their_comparison() -> Non
     apart = differences([("s1", first), ("s2", second)])
     shared = differences([("s1", first | {"x": 40.0}), ("s2", second | {"x": -3.0})])
     assert shared == (replace(apart[0], left_out=1),)
+    # Half of a small group is not most of it: two pairs would have one degree of freedom.
+    half = differences(
+        [("s1", {**first, "x": 1.0, "y": 2.0}), ("s2", {"x": 1.5, "y": 2.6, "z": 4.0, "w": 5.0})]
+    )
+    assert (half[0].paired, half[0].left_out) == (False, 2)
     assert "without 1 participant who took part in both groups" in compared_by(shared)
     assert "without up to 1 participant who" in compared_by((*apart, *shared))
 
