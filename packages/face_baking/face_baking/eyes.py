@@ -96,7 +96,9 @@ def corner_floor(
     flesh, plica = _flesh_and_plica(way, across, side)
     height += nasal * (_FLESH_HIGH_CM * flesh + _PLICA_HIGH_CM * plica) * (1 - 0.5 * stroke)
     above = _FLOOR_SOFT_CM * np.logaddexp(0, height / _FLOOR_SOFT_CM)
-    angle, uv = _eye_uv(path, side, stroke, points.reshape(-1, 3))
+    angle, _ = _eye_uv(path, side, stroke, points.reshape(-1, 3))
+    # The texture's place is the open eye's, so that the floor's veins do not swim under moving lids.
+    _, uv = _eye_uv(path, side, 0.0, _between_lids(path, path.rest, side, nasal)[0].reshape(-1, 3))
     # Below the white before the iris's rim, and below the iris itself: before it, its end was a dark line.
     sunk = 0.004 + 0.06 * smooth(0.65, 0.48, angle) + 0.4 * smooth(0.48, 0.41, angle)
     sunk = sunk.reshape(height.shape)
