@@ -100,13 +100,17 @@ def serve_postgresql(_folder: Path) -> None:
                 target.sendall(part)
             target.shutdown(socket.SHUT_WR)
 
+    def connect(outer: socket.socket) -> None:
+        with outer, socket.socket(socket.AF_UNIX) as inner:
+            inner.connect(f"{socket_folder}/.s.PGSQL.5432")
+            back = threading.Thread(target=carry, args=(inner, outer), daemon=True)
+            back.start()
+            carry(outer, inner)
+            back.join()
+
     def accept() -> None:
         while True:
-            outer = listener.accept()[0]
-            inner = socket.socket(socket.AF_UNIX)
-            inner.connect(f"{socket_folder}/.s.PGSQL.5432")
-            for ends in ((outer, inner), (inner, outer)):
-                threading.Thread(target=carry, args=ends, daemon=True).start()
+            threading.Thread(target=connect, args=(listener.accept()[0],), daemon=True).start()
 
     threading.Thread(target=accept, daemon=True).start()
 
