@@ -101,9 +101,9 @@ class WholeExamplesCommand(TyperCommand):
         parse = parser.parse_args
 
         def parse_once(args: list[str]) -> Any:
-            found = parse(args)
-            _refuse_twice(ctx, found[2])
-            return found
+            options, arguments, order = parse(args)
+            _refuse_twice(ctx, order)
+            return options, arguments, order
 
         parser.parse_args = parse_once  # type: ignore[method-assign]
         return parser
