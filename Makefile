@@ -111,7 +111,7 @@ playground: setup ## build the blink engine's pages that open from a folder: dis
 
 docs: setup-test ## write the reference pages from the code and build the documentation site, served at /docs
 	@$(BIN)/python tools/reference.py
-	@$(BIN)/python -m sphinx -q -W --keep-going -b html -d build/doctrees docs frontend/dist/docs
+	@$(PYTHON) tools/setup.py docs
 
 wheel: setup-test ## build the wheel and the sdist with pages, docs and the demo: dist/palpebra-VERSION-py3-none-any.whl
 	@$(BIN)/python tools/build_wheel.py

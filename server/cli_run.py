@@ -3,6 +3,7 @@
 import os
 import shutil
 import socket
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -50,8 +51,13 @@ def run(
         int, typer.Option(min=1, max=64, help="Number of processes; more than one requires PostgreSQL.")
     ] = 1,
     welcome: Annotated[
-        bool, typer.Option(help="Print the links of open studies and of the admin site.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--welcome/--no-welcome",
+            help="Print the links of open studies and of the admin site. Default: in a terminal only; a log "
+            "should not hold them.",
+        ),
+    ] = None,
 ) -> None:
     """Serve participants and experimenters until stopped (Ctrl-C); running requests are finished first.
 
@@ -68,7 +74,7 @@ def run(
         close_to_others(settings)
         begin_ledger(settings)
         services.settings.key  # noqa: B018 - made now, once, before workers ask for it
-        if welcome:
+        if sys.stdout.isatty() if welcome is None else welcome:
             _print_welcome(services)
     # No access log: it would write every participant's internet address.
     with _shared_counts(workers):

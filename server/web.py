@@ -183,7 +183,7 @@ DOCS_NOT_BUILT = """<!doctype html>
 <h1>The documentation is not ready</h1>
 <p>In a checkout, <code>make run</code> builds it in the background; this page looks for it every ten seconds.
 If it does not appear within two minutes, <code>build/docs.log</code> says why, and <code>make docs</code>
-builds it again. A container is made without it.
+waits for it or builds it again. A container is made without it.
 You can also read the files in its folder <code>docs</code>.</p>
 </html>
 """

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -80,18 +79,16 @@ def draw_strips(stamp_text: str) -> None:
 
 
 def build_docs_meanwhile() -> None:
-    """Build the documentation site in the background, at low priority: what it says goes to a file.
+    """Build the documentation site in the background: what it says goes to a file.
 
     The first run renders clips for longer than this takes. A later run does not wait for it, so the server
     shows the old site, or a page that says what is missing, for half a minute.
     """
     log = ROOT / "build" / "docs.log"
     log.parent.mkdir(exist_ok=True)
-    slowly = ["nice", "-n", "10"] if shutil.which("nice") else []
+    print("[docs] building the documentation site in the background, for /docs", flush=True)
     with log.open("w", encoding="utf-8") as file:
-        subprocess.Popen(
-            [*slowly, BIN / "python", "tools/setup.py", "docs"], cwd=ROOT, stdout=file, stderr=file
-        )
+        subprocess.Popen([BIN / "python", "tools/setup.py", "docs"], cwd=ROOT, stdout=file, stderr=file)
 
 
 def main() -> None:

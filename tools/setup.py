@@ -172,7 +172,14 @@ def build_docs() -> None:
 
 
 def prepare_docs() -> None:
-    step("docs", docs_sources(), build_docs, FRONTEND / "dist" / "docs" / "index.html")
+    """Build the site unless it is current; a second build of the same checkout waits for the first."""
+    (ROOT / "build").mkdir(exist_ok=True)
+    with (ROOT / "build" / "docs-site.lock").open("w") as lock:
+        if sys.platform != "win32":
+            import fcntl
+
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        step("docs", docs_sources(), build_docs, FRONTEND / "dist" / "docs" / "index.html")
 
 
 def docs_sources() -> list[Path]:

@@ -103,7 +103,7 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
         }),
       ),
     {
-      touches: [["study", summary.name], ["studies"]],
+      touches: [["study", summary.name], ["studies"], ["links", summary.name]],
       // The dialog with the link says so itself; a message in the corner would lie over it on a phone.
       done: ({ summary: { status } }) => (isOpen(status) ? null : "Status changed."),
       then: (detail) => setOpened(isOpen(detail.summary.status)),
