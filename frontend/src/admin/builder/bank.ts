@@ -141,7 +141,7 @@ export const FORMS: readonly BankForm[] = [
     },
   },
   {
-    title: "Consent, itemised",
+    title: "Consent, itemized",
     about: "Each point to be agreed to, stored as an answer",
     form: {
       name: "consent_points",
