@@ -171,7 +171,18 @@ function firstText(value: unknown): string {
 
 const KNOWN: Record<string, string[]> = {
   languages: ["en", "de"],
-  "render.character": ["alder@8", "alder@9", "birch@6", "birch@7", "cedar@4", "cedar@5", "hazel@5", "cartoon", "cartoon@2", "cartoon-willow"],
+  "render.character": [
+    "alder@8",
+    "alder@9",
+    "birch@6",
+    "birch@7",
+    "cedar@4",
+    "cedar@5",
+    "hazel@5",
+    "cartoon",
+    "cartoon@2",
+    "cartoon-willow",
+  ],
   "render.profile": ["real", "phases", "model", "SL", "AL", "SL_ease", "AL_ease"],
 };
 const FACTORS = ["exemplars.own_per", "blocks.split_by", "analysis.factors", "analysis.pairs", "trial.pairs.factor"];
