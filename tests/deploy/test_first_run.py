@@ -35,6 +35,7 @@ def added(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
                     create_study(session, name, declared, None)
 
     monkeypatch.setattr(first_run, "call", call)
+    monkeypatch.setattr(first_run, "build_docs_meanwhile", lambda: None)  # it takes half a minute
     monkeypatch.setattr(os, "execv", lambda *_: None)
     return added
 

@@ -141,6 +141,7 @@ BEFORE: dict[str, Step] = {
     "server workspace member perception-lab ada --role owner": f"{CREATE} ada",
     "server workspace grant exp3 bob --rights view,export": f"{CREATE} bob",
     "server workspace member vision anna --role experimenter": f"{CREATE} anna",
+    "server workspace member default anna --remove": f"{CREATE} zoe",
     "server link create lids --group fast": (
         "printf '\\n[groups]\\nby = \"link\"\\n' >> lids.toml && server study add lids.toml --clips my-clips"
     ),
