@@ -406,8 +406,8 @@ def _limits_of_recording(baked: RecordingBake, track: EyeTrack) -> Iterator[str]
     frames = baked.frames
     if not baked.labeled:
         yield (
-            "Openings were measured without labels. In recordings of known truth they were up to 0.5 mm off, "
-            "and the widest opening up to 0.7 mm. For more, give a track from labels of your own "
+            "Openings were measured without labels. In rendered recordings of known truth they were up to "
+            "0.5 mm off, and the widest opening up to 0.7 mm. For more, give a track from labels of your own "
             "(docs/how-to/label-frames.md)."
         )
     elif (floor := float((track.shut_px / track.open_px).max())) > FLOOR_SHARE:
