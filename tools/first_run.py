@@ -86,7 +86,7 @@ def build_docs_meanwhile() -> None:
     """
     log = ROOT / "build" / "docs.log"
     log.parent.mkdir(exist_ok=True)
-    print("[docs] building the documentation site in the background, for /docs", flush=True)
+    print("[docs] the site at /docs is built in the background where it is not current", flush=True)
     with log.open("w", encoding="utf-8") as file:
         subprocess.Popen([BIN / "python", "tools/setup.py", "docs"], cwd=ROOT, stdout=file, stderr=file)
 
