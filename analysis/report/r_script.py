@@ -116,8 +116,26 @@ SCRIPT, DATA = "verify.R", "cell-means.csv"
 # Plain ASCII without dots: such a name needs no backticks in a formula.
 _R_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _TAKEN = frozenset(
-    {"participant", "mean", "T", "F", "TRUE", "FALSE", "NA", "NULL", "if", "else", "for", "in", "function"}
+    {
+        *("participant", "rating", "mean", "emmean", "SE", "df", "T", "F", "TRUE", "FALSE"),
+        *(
+            "NA",
+            "NULL",
+            "NaN",
+            "Inf",
+            "if",
+            "else",
+            "for",
+            "in",
+            "function",
+            "while",
+            "repeat",
+            "next",
+            "break",
+        ),
+    }
 )
+"""Words of R's own, and columns that the script or emmeans adds to a factor's."""
 
 
 def r_files(analysis: Analysis, key: str = "") -> dict[str, bytes]:
@@ -177,9 +195,10 @@ def factors_in_r(analysis: Analysis, names: dict[str, str]) -> list[dict[str, st
 
 
 def design_in_r(analysis: Analysis, names: dict[str, str]) -> dict[str, Any]:
-    """What every script of an ANOVA says of its design: factors, formula, type of sums of squares."""
+    """What every script of an ANOVA says of its design: columns, formula, type of sums of squares."""
     return {
         "factors": factors_in_r(analysis, names),
+        "numbers": [names[c.name] for c in analysis.anova.between.covariates],
         "formula": formula_in_r(analysis, names),
         "type": analysis.anova.sum_of_squares,
     }

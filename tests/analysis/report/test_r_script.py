@@ -228,6 +228,26 @@ def test_names_and_levels_that_r_would_read_as_code_stay_text(tmp_path) -> None:
     assert "Error(participant/(variable_1))" in script
 
 
+def test_r_reads_levels_and_factors_that_look_like_its_own_words(tmp_path) -> None:
+    """Levels NA, True and 01 are not missing, TRUE and 1; factors may have the names of R's own columns."""
+    needed("afex", "car", "emmeans")
+    rng = np.random.default_rng(3)
+    path = tmp_path / "words.csv"
+    rows = [
+        f"p{i},{group},{20 + 3 * i % 19},{shown},{number},{rng.normal():.3f}"
+        for i, group in enumerate(["NA", "True", "1e1", "NA"] * 4)
+        for shown in ("True", "False")
+        for number in ("1", "01", "NaN")
+    ]
+    path.write_text("\n".join(["id,SE,df,rating,next,score", *rows]))
+    call = ["anova", str(path), "--participant", "id", "--rating", "score", "--within", "rating,next"]
+    call += ["--between", "SE", "--covariate", "df", "--robust", "--out", str(tmp_path / "words")]
+    told = CliRunner().invoke(app, call)
+    assert told.exit_code == 0, told.output
+    for said in run_together([tmp_path / "words" / name for name in ("verify.R", "robust-verify.R")]):
+        assert "Every number agrees with R." in said, said
+
+
 def test_without_a_report_there_is_nothing_to_verify() -> None:
     call = ["anova", str(GOLDEN / "within/complete_1.csv"), *CALL, "--within", "A", "--verify-with-r"]
     told = CliRunner().invoke(app, call)
