@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.folder import reader_of
-from analysis.read.wide import said_of_copies, wide_hint
+from analysis.read.wide import refuse_names_twice, said_of_copies, wide_hint
 from analysis.within.level_codes import natural_order
 from experiments.errors import InputError, nearest
 from table_files.cells import Cells
@@ -233,11 +233,8 @@ def _names_to_read(
                 or _columns_there(name, header)
             )
             raise InputError(f"{source} has no column '{name}'{hint}")
-    # counted once for all: a header may have 100,000 names
-    there, asked = Counter(header), {*needed, *optional}
-    for name, times in there.items():
-        if name and times > 1 and name in asked:
-            raise InputError(f"{source} has two columns called '{name}'; rename one")
+    there, asked = frozenset(header), {*needed, *optional}
+    refuse_names_twice([name for name in header if name in asked], source)
     return list(dict.fromkeys([*needed, *(name for name in optional if name in there)]))
 
 

@@ -1,6 +1,7 @@
 """Wide tables, one row a person and one column a cell of the design, made long."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -248,6 +249,7 @@ def lengthen(path: Path, pattern: str, rating: str, kept: Sequence[str] = ()) ->
     """
     reader = reader_of(path)
     header = [name for name in reader.header() if name]
+    refuse_names_twice(header, path.name)
     factors = tuple(_PLACEHOLDER.findall(pattern))
     _refuse_pattern(pattern, factors)
     for name in kept:
@@ -284,6 +286,14 @@ def lengthen(path: Path, pattern: str, rating: str, kept: Sequence[str] = ()) ->
     copies = said_of_copies(read.rows, [str(line) for line in read.lines])
     decisions = (*read.decisions, *([copies] if copies else []))
     return LongTable(rows, factors, len(levels), beside, decisions)
+
+
+def refuse_names_twice(header: Sequence[str], source: str) -> None:
+    """Refuse names that two columns have; unnamed columns are not read."""
+    # counted once for all: a header may have 100,000 names
+    for name, times in Counter(header).items():
+        if name and times > 1:
+            raise InputError(f"{source} has two columns called '{name}'; rename one")
 
 
 def _with_words(read: Cells, beside: Sequence[str]) -> pd.DataFrame:

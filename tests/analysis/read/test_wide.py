@@ -70,6 +70,14 @@ def test_patterns_that_cannot_be_used_end_in_one_line(tmp_path, pattern, said) -
         lengthen(wide_file(tmp_path), pattern, "score")
 
 
+@pytest.mark.parametrize("header", ["id,t1,t2,t1", "id,age,t1,t2,age"])
+def test_two_columns_of_one_name_are_refused(tmp_path, header) -> None:
+    path = tmp_path / "w.csv"
+    path.write_text(f"{header}\n{','.join('12345'[: header.count(',') + 1])}\n")
+    with pytest.raises(InputError, match=r"w.csv has two columns called '(t1|age)'; rename one"):
+        lengthen(path, "t{time}", "score")
+
+
 def test_columns_that_a_pattern_fits_by_chance_can_be_kept(tmp_path: Path) -> None:
     """Columns `id, slow, fast`: the id is not a condition."""
     path = tmp_path / "w.csv"
