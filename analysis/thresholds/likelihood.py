@@ -72,7 +72,7 @@ def function(shape: Shape, x: Array, location: float, log_spread: float) -> Arra
 class Likelihood:
     """The likelihood of one data set; parameters are location, log spread and, if fitted, lapse.
 
-    If `falling` is not given, the answers decide it, but only without a guess rate.
+    If `falling` is not given, the answers decide it.
     """
 
     def __init__(
@@ -81,8 +81,7 @@ class Likelihood:
         self.trials, self.shape, self.guess, self.lapse = trials, shape, guess, lapse
         centred = trials.x - np.average(trials.x, weights=trials.n)
         # The sign of the covariance of stimulus and answer.
-        seen = guess == 0.0 and float(np.sum(centred * trials.k)) < 0
-        self.falling = seen if falling is None else falling
+        self.falling = float(np.sum(centred * trials.k)) < 0 if falling is None else falling
         self.width = float(trials.x.max() - trials.x.min())
 
     def probabilities(self, values: Array) -> Array:

@@ -364,7 +364,9 @@ def _fitted(
             where = "" if condition == "all" else f" ({condition})"
             raise InputError(f"{answers.source}{where}: {error}") from error
         if answers.participant is not None:
-            people += _people(answers, rows, condition, shape, guess, lapse, falling)
+            # Of everybody: one person's few answers, or exchanged keys, must not turn the function around.
+            down = pooled[condition].falling
+            people += _people(answers, rows, condition, shape, guess, lapse, down)
     means = [mean for condition in pooled if (mean := mean_threshold(people, condition)) is not None]
     return ThresholdsResult(pooled, tuple(people), tuple(means), answers.x.size, answers.decisions)
 
@@ -399,7 +401,7 @@ def _people(
     shape: Shape,
     guess: float,
     lapse: float | None,
-    falling: bool | None,
+    falling: bool,
 ) -> list[PersonThreshold]:
     fits = []
     names = answers.participant

@@ -328,7 +328,7 @@ def fit_planes(
 ) -> PlanesResult:
     """Fit every condition over all trials and, where people are named, every person in it and all together.
 
-    If `falling` is not given, the answers decide it, but only without a guess rate.
+    If `falling` is not given, the answers decide it.
 
     Parameters
     ----------
@@ -355,7 +355,7 @@ def fit_planes(
     population: dict[str, PopulationPlane] = {}
     for condition in answers.conditions():
         rows = labels == condition
-        down = _falls(answers, rows, guess) if falling is None else falling
+        down = _falls(answers, rows) if falling is None else falling
         fit, reason = fit_or_reason(points_of(answers, rows), shape, guess, lapse, down, middle)
         if fit is None:
             reasons[condition] = reason
@@ -379,10 +379,9 @@ def fit_planes(
     return PlanesResult(pooled, reasons, tuple(people), means, size, answers.decisions, population)
 
 
-def _falls(answers: Answers, rows: NDArray[np.bool_], guess: float) -> bool:
+def _falls(answers: Answers, rows: NDArray[np.bool_]) -> bool:
     x, y = answers.x[rows], answers.response[rows]
-    # With a guess rate, answers are right or wrong: they rise with what makes a stimulus easy.
-    return guess == 0.0 and float(np.sum((x - x.mean()) * y)) < 0
+    return float(np.sum((x - x.mean()) * y)) < 0
 
 
 def points_of(answers: Answers, rows: NDArray[np.bool_] | slice = slice(None)) -> Points:

@@ -88,8 +88,7 @@ def fit_threshold(
         Whether to profile the likelihood for intervals: every other parameter is fitted again at each value.
 
     falling : bool, optional
-        Whether positive answers become rarer with x; if not given, the answers decide it, if there is no
-        guess rate.
+        Whether positive answers become rarer with x; if not given, the answers decide it.
 
     Raises
     ------
@@ -107,6 +106,8 @@ def fit_threshold(
     step = _is_step(model, trials, best)
     notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None, step) + _below(trials, guess)
     notes += _untested(trials, len(best))
+    if guess and model.falling and falling is None:
+        notes.append("correct answers become rarer as x increases: the function falls")
     low, high = float(trials.x.min()), float(trials.x.max())
     # Three ranges away F is as good as straight over the levels: its place would follow from its assumed
     # shape alone.

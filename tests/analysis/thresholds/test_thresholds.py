@@ -12,9 +12,9 @@ from scipy import optimize, special
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.thresholds.answers import count_trials, read_answers
+from analysis.thresholds.answers import Answers, count_trials, read_answers
 from analysis.thresholds.likelihood import Trials
-from analysis.thresholds.people import PersonThreshold, mean_threshold
+from analysis.thresholds.people import PersonThreshold, fit_thresholds, mean_threshold
 from analysis.thresholds.psychometric import Threshold, fit_threshold
 from experiments.errors import InputError
 
@@ -72,6 +72,36 @@ def test_a_falling_function_is_the_rising_one_of_the_other_answer() -> None:
     assert falling.falling
     assert falling.threshold == pytest.approx(rising.threshold, rel=1e-6)
     assert falling.slope == pytest.approx(-rising.slope, rel=1e-5)
+
+
+def test_correct_answers_that_become_rarer_are_fitted_as_the_mirrored_ones() -> None:
+    """With a guess rate, too, the answers say whether the function falls: x may be a blur."""
+    x = np.linspace(-3, 3, 9)
+    n, k = np.full(9, 40.0), np.array([40.0, 39, 36, 34, 28, 30, 22, 24, 21])
+    falling = fit_threshold(Trials(x, n, k), guess=0.5, lapse=None)
+    rising = fit_threshold(Trials(-x[::-1], n, k[::-1]), guess=0.5, lapse=None)
+    assert falling.falling
+    assert not rising.falling
+    assert falling.threshold == pytest.approx(-rising.threshold, rel=1e-5)
+    assert falling.spread == pytest.approx(rising.spread, rel=1e-5)
+    assert falling.log_likelihood == pytest.approx(rising.log_likelihood, abs=1e-8)
+    assert any("the function falls" in note for note in falling.notes)
+
+
+def test_a_person_is_fitted_in_the_direction_of_all() -> None:
+    """One person's exchanged keys, or few answers, do not turn the function around for that person."""
+    x, share = np.arange(1.0, 6.0), np.array([1, 3, 10, 16, 19])
+    up = np.concatenate([np.repeat([1.0, 0.0], [k, 20 - k]) for k in share])
+    answered = np.concatenate([up, up, up, 1 - up])
+    names = np.repeat(["a", "b", "c", "exchanged"], 100).astype(object)
+    answers = Answers(np.tile(np.repeat(x, 20), 4), answered, names, None, "trials.csv", False, ())
+    result = fit_thresholds(answers, "normal", 0.0, 0.0)
+    fits = {one.participant: one.fit for one in result.people}
+    other = fits["exchanged"]
+    assert other is not None
+    assert not other.falling
+    assert any("hardly change" in note for note in other.notes)
+    assert result.means[0].mean == pytest.approx(fits["a"].threshold, rel=1e-3)
 
 
 def test_answers_that_switch_at_once_are_said_so() -> None:
