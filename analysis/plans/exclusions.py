@@ -1,6 +1,6 @@
 """Apply the exclusion rules an experiment declared before its data; every one named with its reason."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import assert_never
 
@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.study_answers import StudyAnswers
+from analysis.read.text_table import flags
 from analysis.votes import Screening, screen_raters
 from experiments import rules
 from experiments.declaration.experiment import Experiment
@@ -85,7 +86,7 @@ class RuleVerdicts:
         for run, why in (*self.by_hand, *(said for rule in at for said in self.runs[rule])):
             reasons.setdefault(run, []).append(why)
         # After the other rules: where one of them excludes a first run, the second counts as the first.
-        _later_runs(self.people, reasons, self.first_seen)
+        _later_runs(self.people, reasons, self.first_seen, frozenset(map(str, self.main["run"].unique())))
         excluded = tuple(
             ExcludedRun(str(self.people[run]), str(run), tuple(reasons[run]))
             for run in sorted(reasons)
@@ -174,9 +175,7 @@ def _not_applicable(rows: pd.DataFrame) -> NDArray[np.bool_]:
     """True where the participant chose that the scale does not apply."""
     if "not_applicable" not in rows.columns:
         return np.zeros(len(rows), dtype=bool)
-    # Text, as tables of others write 1, 1.0, true or yes.
-    said = rows["not_applicable"].astype(str).str.casefold()
-    return said.isin(["1", "1.0", "true", "yes"]).to_numpy()
+    return flags(rows["not_applicable"], "the table")
 
 
 def _with_run(rows: pd.DataFrame) -> pd.DataFrame:
@@ -274,11 +273,20 @@ def _by_hand(rows: pd.DataFrame) -> list[tuple[str, str]]:
 
 
 def _later_runs(
-    people: Mapping[str, str], reasons: dict[str, list[str]], first_seen: Mapping[str, str]
+    people: Mapping[str, str],
+    reasons: dict[str, list[str]],
+    first_seen: Mapping[str, str],
+    rated: Set[str],
 ) -> None:
-    """Of several runs of a participant that no rule excludes, keep the first."""
+    """Of several runs of a participant that no rule excludes, keep the first of those `rated`.
+
+    A run that ended in the practice says nothing, and must not take the place of one that has answers.
+    """
     # Without a time the name of a run decides, so that the result is the same each time.
-    order = sorted((run for run in people if run not in reasons), key=lambda r: (first_seen.get(r, ""), r))
+    order = sorted(
+        (run for run in people if run in rated and run not in reasons),
+        key=lambda run: (first_seen.get(run, ""), run),
+    )
     seen: set[str] = set()
     for run in order:
         if people[run] in seen:

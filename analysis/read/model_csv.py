@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis.models.columns import split_covariates
 from analysis.read.number_columns import IN_COVARIATE, holds_numbers, numbers, unusual_numbers
-from analysis.read.reading import EXPORT_COLUMNS, rows_that_count
+from analysis.read.reading import EXPORT_COLUMNS, report_visits, rows_that_count
 from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
 from experiments.kinds.clip_rating import RATINGS
@@ -80,10 +80,11 @@ def read_model_input(
         unusual_numbers(table, name, given, IN_COVARIATE)
     rows = table.columns.assign(**{rating: values}, **measured)
     keep = ~np.isnan(values)
-    decisions = list(table.decisions)
+    left_out: list[str] = []
     if exported:
-        keep, left_out = rows_that_count(rows, keep)
-        decisions += left_out
+        keep, left_out = rows_that_count(rows, keep, path.name)
+        report_visits(table, keep)
+    decisions = [*table.decisions, *left_out]
     if np.isnan(values).any():
         decisions.append(f"{np.isnan(values).sum()} rows without a rating excluded")
     # Counted among the rows that are left, so that no row is named twice.

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.read.text_table import TextTable
+from analysis.read.text_table import NAMED_ROWS, TextTable, flags
 from experiments.columns import View, names_of
 from experiments.columns.base import LEVELS, RUN, STUDY
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 
 # Which columns the analysis reads of the rows of a kind of trial.
 
@@ -73,21 +73,46 @@ EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic")
 _COUNT = (
     ("kind", ("main", ""), "practice and attention trials"),
     ("verdict", ("good", "uncertain", "flagged", ""), "failed plays"),
-    ("excluded", ("0", "False", "false", ""), "rows of runs excluded by hand"),
 )
 
 
-def rows_that_count(rows: pd.DataFrame, keep: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], list[str]]:
+def rows_that_count(
+    rows: pd.DataFrame, keep: NDArray[np.bool_], source: str
+) -> tuple[NDArray[np.bool_], list[str]]:
     """Of the rows to `keep` (n,) those that count, and a sentence for each reason that leaves some out."""
     decisions = []
-    for column, good, why in _COUNT:
-        if column not in rows.columns:
-            continue
-        out = keep & ~rows[column].astype(str).isin(good).to_numpy()
+    bad = [
+        (~rows[column].astype(str).isin(good).to_numpy(), why)
+        for column, good, why in _COUNT
+        if column in rows.columns
+    ]
+    if "excluded" in rows.columns:
+        bad.append((flags(rows["excluded"], source), "rows of runs excluded by hand"))
+    for marked, why in bad:
+        out = keep & marked
         if out.any():
             decisions.append(f"{out.sum()} {why} excluded")
         keep = keep & ~out
     return keep, decisions
+
+
+def report_visits(table: TextTable, keep: NDArray[np.bool_]) -> None:
+    """Say of an export that the rows to `keep` (n,) hold several runs of one participant.
+
+    `analysis run` counts the first run that no rule excludes; a table alone does not say which that is.
+    """
+    if not {"participant", "run"} <= set(table.header):
+        return
+    pairs = table.read_again(["participant", "run"])[keep].drop_duplicates()
+    times = pairs["participant"].value_counts()
+    again = sorted(str(name) for name in times.index[times > 1])
+    if again:
+        rest = len(again) - NAMED_ROWS
+        named = f"{', '.join(again[:NAMED_ROWS])}{f' and {rest} more' if rest > 0 else ''}"
+        table.decisions.append(
+            f"{counted(len(again), 'participant')} took part more than once ({named}), and the answers of "
+            "all runs were counted; `analysis run` counts the first run only"
+        )
 
 
 _OF_AN_EXPORT = frozenset({"kind", "trial_index", "run", "verdict", "excluded"})
@@ -109,10 +134,11 @@ def answers_that_count(
     """
     if not marks <= set(table.header):
         return keep
-    keep, left_out = rows_that_count(table.columns, keep)
+    keep, left_out = rows_that_count(table.columns, keep, table.source)
     table.decisions.extend(left_out)
     if not keep.any():
         raise InputError(f"{table.source}: there are no usable {what}; {', '.join(left_out)}")
+    report_visits(table, keep)
     return keep
 
 

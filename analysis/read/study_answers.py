@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from analysis.read.number_columns import MISSING_MARKS, numbers
 from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, TRIAL_PLACES, NoRatingsError, Reading
-from analysis.read.text_table import read_text_table
+from analysis.read.text_table import flags, read_text_table
 from experiments.columns.runs import EVIDENCE_COLUMNS
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
@@ -58,7 +57,7 @@ def load_csv(path: Path, experiment: Experiment, reading: Reading, study: str | 
             rows[name] = numbers(table, name)
     for name in RUN_FLAGS:
         if name in rows.columns:
-            rows[name] = _flags(rows[name])
+            rows[name] = flags(rows[name], path.name)
     seen = _first_seen(rows)
     rows = rows.drop(columns="saved_at", errors="ignore")
     rows, chosen = _of_one_study(rows, experiment.name, study, path.name)
@@ -115,11 +114,6 @@ def _has_no_rows(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         return bool(file.readline().strip()) and not file.read(64).strip()
-
-
-def _flags(column: pd.Series) -> NDArray[np.bool_]:
-    yes = [text for text in column.cat.categories if str(text).casefold() in {"1", "true", "yes"}]
-    return column.isin(yes).to_numpy()
 
 
 def _first_seen(rows: pd.DataFrame) -> dict[str, str]:

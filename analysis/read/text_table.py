@@ -26,6 +26,25 @@ from table_files.open import Reader
 EMPTY = frozenset({"", "null", "None", "undefined", '""', "NaN"})
 
 
+YES = frozenset({"1", "1.0", "true", "yes"})
+"""What a flag says, in lower case; pandas writes 1 as 1.0 where a cell of the column is empty."""
+NO = frozenset({"0", "0.0", "false", "no", "na", "nan", ""})
+
+
+def flags(column: "pd.Series[Any]", source: str) -> NDArray[np.bool_]:
+    """A column of flags as truth values; an empty cell is none.
+
+    Raises
+    ------
+    InputError
+        A word that says neither: whether an answer counts must not be guessed.
+    """
+    words = column.astype(str).str.casefold()
+    if (other := ~words.isin(YES | NO)).any():
+        raise InputError(f"{source}: '{column.name}' is '{column[other].iloc[0]}' in a row; expected 0 or 1")
+    return words.isin(YES).to_numpy()
+
+
 @dataclass(frozen=True)
 class Program:
     """A program, the columns only it writes, and the column that says what sort a row is."""
@@ -120,7 +139,15 @@ class TextTable:
         """Whether a column `synthetic`, where it was read, marks a row as made and not given by a person."""
         # pandas and R write a column of 0 and 1 that has passed through a condition as words.
         marks = self.columns.get("synthetic")
-        return marks is not None and bool(marks.astype(str).str.lower().isin(("1", "1.0", "true")).any())
+        return marks is not None and bool(marks.astype(str).str.lower().isin(YES).any())
+
+    def read_again(self, names: Sequence[str]) -> pd.DataFrame:
+        """Columns of the file as they are there, of the rows that are in this table."""
+        if self.reader is None:
+            return pd.DataFrame(index=self.columns.index)
+        cells = self.reader.cells(list(names))
+        keys = pd.Index(_row_keys(cells.lines, cells.files))
+        return cells.rows.iloc[keys.get_indexer(pd.Index(_row_keys(self.lines, self.files)))]
 
     def line(self, row: int) -> str:
         """Line of the file on which data row `row` (from 0) begins: `7`, in a folder `7 of p1.csv`."""
@@ -172,13 +199,8 @@ def _copies(table: TextTable, names: Sequence[str]) -> str:
     # Only where the columns that were read look copied, the whole file is read to compare all.
     if not said_of_copies(table.columns[list(names)], _Places(table)):
         return ""
-    if table.reader is None:
-        return ""
     every = list(dict.fromkeys(name for name in table.header if name))
-    cells = table.reader.cells(every)
-    keys = _row_keys(cells.lines, cells.files)
-    where = pd.Index(keys).get_indexer(pd.Index(_row_keys(table.lines, table.files)))
-    return said_of_copies(cells.rows.iloc[where], _Places(table))
+    return said_of_copies(table.read_again(every), _Places(table))
 
 
 def _row_keys(lines: NDArray[np.int64], files: NDArray[np.str_] | None) -> list[tuple[str, int]]:

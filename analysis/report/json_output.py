@@ -177,7 +177,8 @@ def left_out(exclusions: "Exclusions") -> tuple[str, ...]:
         for d in exclusions.trials
     ]
     if not lines:
-        lines = [f"No analyzed trial was excluded (of {counted(exclusions.n_runs, 'participant')})"]
+        people = int(exclusions.rows["participant"].nunique())
+        lines = [f"No analyzed trial was excluded (of {counted(people, 'participant')})"]
         if exclusions.set_aside:
             *others, last = exclusions.set_aside
             named = f"{', '.join(others)} and {last}" if others else last

@@ -124,6 +124,27 @@ def test_failed_attention_checks_exclude(tmp_path, rows) -> None:
     assert analysis.anova.y.shape == (7, 4)
 
 
+def test_a_run_without_a_rating_does_not_take_the_place_of_one_with_ratings(tmp_path, rows) -> None:
+    """Whoever left during the practice and came back is analyzed, and counted once."""
+    rows = change(rows, lambda row: True, saved_at="2026-01-02T00:00:00Z")
+    begun = {"run": "begun", "kind": "practice", "saved_at": "2026-01-01T00:00:00Z"}
+    analysis = analyse(tmp_path, [rows[0] | begun, *rows], with_rules())
+    assert analysis.anova.y.shape == (8, 4)
+    assert analysis.exclusions.runs == ()
+    said = left_out(analysis.exclusions)
+    assert said == ("No analyzed trial was excluded (of 8 participants); 1 practice trial was set aside",)
+
+
+@pytest.mark.parametrize("words", [("1.0", "0.0"), ("TRUE", "FALSE"), ("yes", "")])
+def test_exclusion_by_hand_is_read_as_other_programs_write_it(tmp_path, rows, words) -> None:
+    out, kept = words
+    rows = [row | {"excluded": out if row["run"] == "run1" else kept} for row in rows]
+    analysis = analyse(tmp_path, rows, with_rules())
+    assert [run.run for run in analysis.exclusions.runs] == ["run1"]
+    with pytest.raises(InputError, match="'excluded' is 'maybe' in a row; expected 0 or 1"):
+        analyse(tmp_path, [row | {"excluded": "maybe"} for row in rows], with_rules())
+
+
 def test_exclusion_by_hand_and_later_runs_are_named(tmp_path, rows) -> None:
     rows = change(rows, lambda row: row["run"] == "run1", excluded=1, exclusion_reason="fell asleep")
     rows = change(rows, lambda row: row["run"] == "run5", participant="P02", saved_at="2026-01-02T00:00:00Z")

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from analysis.read.long_csv import read_long_table
+from analysis.read.model_csv import read_model_input
 from analysis.thresholds.answers import read_answers
 from analysis.votes import read_votes
+from experiments.errors import InputError
 
 HEADER = "run,participant,run_status,trial_index,kind,profile_id,face,stimulus,response,verdict,excluded\n"
 
@@ -35,6 +37,43 @@ def test_anova_and_ranks(export: Path) -> None:
     assert len(data.rows) == 4
     assert set(data.rows["participant"]) == {"p1", "p2"}
     assert "practice" in said(data.decisions)
+
+
+@pytest.mark.parametrize("words", [("1.0", "0.0"), ("TRUE", "FALSE")])
+def test_flags_as_other_programs_write_them(export: Path, words: tuple[str, str]) -> None:
+    """pandas writes 0 and 1 as 0.0 and 1.0 where a cell of the column is empty, R as FALSE and TRUE."""
+    out, kept = words
+    lines = export.read_text().splitlines()
+    ends = {"1": out, "0": kept}
+    changed = [lines[0], *(f"{line[:-1]}{ends[line[-1]]}" for line in lines[1:])]
+    export.write_text("\n".join(changed), encoding="utf-8")
+    assert set(read_long_table(export, "participant", "response", ["face"]).rows["participant"]) == {
+        "p1",
+        "p2",
+    }
+    model = read_model_input(export, "participant", "response", ["face"], [])
+    assert set(model.rows["participant"]) == {"p1", "p2"}
+
+
+def test_a_flag_that_says_neither_is_refused(export: Path) -> None:
+    export.write_text(export.read_text().replace("good,1", "good,WAHR"), encoding="utf-8")
+    with pytest.raises(InputError, match="'excluded' is 'WAHR' in a row; expected 0 or 1"):
+        read_long_table(export, "participant", "response", ["face"])
+
+
+def test_two_runs_of_one_participant_are_said(export: Path) -> None:
+    assert "more than once" not in said(
+        read_long_table(export, "participant", "response", ["face"]).decisions
+    )
+    export.write_text(export.read_text().replace("rp2,p2", "rp2,p1"), encoding="utf-8")
+    expected = "1 participant took part more than once (p1), and the answers of all runs were counted"
+    readings = (
+        read_long_table(export, "participant", "response", ["face"]),
+        read_model_input(export, "participant", "response", ["face"], []),
+        read_votes(export, "stimulus", "participant", "response"),
+    )
+    for reading in readings:
+        assert expected in said(reading.decisions)
 
 
 def test_opinion_and_agreement(export: Path) -> None:
