@@ -69,6 +69,10 @@ def impure(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Experiment]:
         row["clip_sha256"] = row["stimulus"]
         if row["run"] == unfinished or number % 7 == 0 or number % 11 == 0:
             row["response"] = 7
+    # A second visit of a person who finished the first; its name sorts before.
+    second = [row for row in rows if row["run"] == rows[-1]["run"]]
+    later = {"run": "again", "response": 7, "saved_at": "2026-11-02T09:00:00Z"}
+    rows = [row | {"saved_at": "2026-11-01T09:00:00Z"} for row in rows] + [row | later for row in second]
     return write_export(tmp_path_factory.mktemp("rules") / "rules.csv", study, rows), study
 
 
