@@ -125,7 +125,7 @@ def test_failed_attention_checks_exclude(tmp_path, rows) -> None:
 
 
 def test_a_run_without_a_rating_does_not_take_the_place_of_one_with_ratings(tmp_path, rows) -> None:
-    """Whoever left during the practice and came back is analyzed, and counted once."""
+    """A person who left during the practice and came back is analyzed, and counted once."""
     rows = change(rows, lambda row: True, saved_at="2026-01-02T00:00:00Z")
     begun = {"run": "begun", "kind": "practice", "saved_at": "2026-01-01T00:00:00Z"}
     analysis = analyse(tmp_path, [rows[0] | begun, *rows], with_rules())
