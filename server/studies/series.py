@@ -29,6 +29,7 @@ from server.studies.schemas import (
     PlacedClip,
     SeriesOut,
 )
+from video_conversion.prepared import clip_name
 
 # The data series of a study: versions that measure the same, and whose answers may be pooled.
 
@@ -99,7 +100,8 @@ def series_for(study: Study, experiment: Experiment, clips: Content, sizes: Size
     """The series of a further version: the latest whose versions all measure the same by the same clips.
 
     Where there is none, a new series begins. One version is not enough: a form may be new to an older version
-    and another form than that of a newer one. Sizes count where participants measure their screens.
+    and another form than that of a newer one. Sizes, as far as they are known, count where participants
+    measure their screens.
     """
     if experiment.display.calibrate == "off":
         sizes = None
@@ -108,7 +110,8 @@ def series_for(study: Study, experiment: Experiment, clips: Content, sizes: Size
         by_series.setdefault(version.series, []).append(version)
     for series in dict.fromkeys(version.series for version in reversed(study.versions)):
         if all(
-            _measures_the_same(version, experiment, clips) and sizes in (None, sizes_of_version(version))
+            _measures_the_same(version, experiment, clips)
+            and (sizes or {}).items() <= sizes_of_version(version).items()
             for version in reversed(by_series[series])
         ):
             return series
@@ -126,15 +129,19 @@ def effects_of_edit(
     """What saving this definition as a further version would do to the answers that are stored."""
     present = active_version(session, study)
     known = Manifest.model_validate(present.manifest).clips
-    clips = content_of(known)
+    clips, sizes = content_of(known), sizes_of_version(present)
     if places is not None:
         order = experiment.factor_names
-        clips = {
-            ("/".join(clip.levels.get(name, "") for name in order), clip.exemplar, clip.clip_sha256)
-            for clip in places
+        placed = [("/".join(clip.levels.get(name, "") for name in order), clip) for clip in places]
+        clips = {(cell, clip.exemplar, clip.clip_sha256) for cell, clip in placed}
+        # A clip that moves keeps its size; that of an uploaded clip is known once it is saved.
+        of_clip = {(clip.sha256, clip.file): (clip.width_mm, present.inter_ocular_px) for clip in known}
+        sizes = {
+            (cell, clip.exemplar): of_clip[key]
+            for cell, clip in placed
+            if (key := (clip.clip_sha256, clip_name(clip.file))) in of_clip
         }
-    # Clips that stay keep their sizes; those of other clips are known once they are saved.
-    series = series_for(study, experiment, clips, None if places is not None else sizes_of_version(present))
+    series = series_for(study, experiment, clips, sizes)
     runs = repository.run_count_of_series(session, study, present.series)
     changes = [
         ChangeOut(path=change.path, effect=change.effect, text=str(change))

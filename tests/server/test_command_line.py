@@ -20,6 +20,7 @@ from server.core.values import now
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
 from server.participation.tally_pools import pooled_tally
 from server.results.repository import Pool
+from server.studies.schemas import PlacedClip
 from server.studies.series import compare_versions, effects_of_edit
 from tests.helpers.databases import BACKENDS, run_server_command
 from tests.helpers.motion_checks import checked
@@ -107,6 +108,14 @@ def test_another_size_of_the_same_clips_makes_a_version_and_a_series(
         assert effects_of_edit(session, study, definition).series == 2
         study.active_version = 1
         assert effects_of_edit(session, study, definition).series == 1
+        # Clips that the builder lists with their cells keep their sizes, too.
+        places = [
+            PlacedClip(clip_sha256=c.clip_sha256, file=c.file, levels=c.levels, exemplar=c.exemplar)
+            for c in study.versions[0].clips
+        ]
+        assert effects_of_edit(session, study, definition, places).series == 1
+        places[0].clip_sha256 = "0" * 64
+        assert effects_of_edit(session, study, definition, places).series == 3
         comparison = compare_versions(session, ("short", 1), ("short", 2), OPERATOR)
         assert (comparison.clips, comparison.keys, comparison.pooled) == ([], [], False)
 
