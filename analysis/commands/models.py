@@ -240,6 +240,7 @@ def mixed(
             effects=model.effects,
             slope_effects=model.slope_effects,
             group_slopes=model.group_slopes,
+            correlated_slopes=model.correlated_slopes,
             df_method=df.value,
             intervals=intervals,
             means=means,
@@ -341,7 +342,8 @@ def ordinal(
             model.rating,
             data.within,
             clips,
-            cast("Slopes", model.slopes or "none"),
+            # Covariates that correlate with the intercept are refused as all that correlate are.
+            "correlated" if model.correlated_slopes else cast("Slopes", model.slopes or "none"),
             model.between,
             model.covariates,
             quadrature,
@@ -379,6 +381,7 @@ class _Model:
     effects: tuple[str, ...] | None = None
     slope_effects: tuple[str, ...] = ()
     group_slopes: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    correlated_slopes: tuple[str, ...] | None = None
 
 
 def _read_model(
@@ -407,6 +410,7 @@ def _read_model(
             options.effects,
             options.slope_effects,
             options.group_slopes,
+            options.correlated_slopes,
         )
     columns = (model.within, model.item, model.between, model.covariates, model.random)
     with progress_spinner("reading ratings"):

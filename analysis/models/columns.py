@@ -1,5 +1,6 @@
 """Columns of a long table in a mixed model: their roles, values and units."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
@@ -23,7 +24,9 @@ class ModelTerms:
     `within` vary within participants, `between` do not; `item` (several columns together) names what was
     rated; `covariates` are numbers, centered; `interactions` are products of covariates with covariates or
     factors, by the names of their members; `random` are further groupings with an intercept each, `a/b` for
-    b nested in a. `group_slopes` names effects that differ between the levels of a further grouping.
+    b nested in a and `a:b` for both columns together. `group_slopes` names effects that differ between the
+    levels of a further grouping. `correlated_slopes` are the covariates whose slopes correlate with the
+    participants' intercept; default: all that vary within participants.
     """
 
     participant: str
@@ -37,6 +40,7 @@ class ModelTerms:
     effects: tuple[str, ...] | None = None
     slope_effects: tuple[str, ...] | None = None
     group_slopes: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    correlated_slopes: tuple[str, ...] | None = None
 
 
 def split_covariates(
@@ -83,16 +87,17 @@ Integers = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Grouping:
-    """What trials have in common: `codes` (n,) into the `names` of its levels; `name` is the column's."""
+    """What trials have in common: `codes` (n,) into the `names` of its levels; `name` joins the `columns`."""
 
     name: str
     names: tuple[str, ...] = field(repr=False)
     codes: Integers = field(repr=False)
+    columns: tuple[str, ...] = ()
 
 
 def refuse_unknown_columns(rows: pd.DataFrame, terms: ModelTerms) -> None:
     """Refuse a column that the table lacks, and a table without rows."""
-    nested = [part for name in terms.random for part in name.split("/")]
+    nested = [part for name in terms.random for part in columns_of(name)]
     named = (terms.participant, terms.rating, *terms.within, *terms.between, *terms.item, *terms.covariates)
     for name in (*named, *nested):
         if name not in rows.columns:
@@ -139,10 +144,15 @@ def groupings(rows: pd.DataFrame, terms: ModelTerms) -> tuple[Grouping, ...]:
         for depth in range(1, len(parts) + 1):
             label = ":".join(parts[:depth])
             if all(group.name != label for group in groups):
-                groups.append(_grouping(rows, parts[:depth], label, f"levels of '{label}'"))
+                groups.append(_grouping(rows, columns_of(label), label, f"levels of '{label}'"))
     for k, group in enumerate(groups):
         _refuse_same(group, groups[:k])
     return tuple(groups)
+
+
+def columns_of(grouping: str) -> list[str]:
+    """The columns of a grouping that is written a/b or a:b."""
+    return re.split("[/:]", grouping)
 
 
 def _grouping(rows: pd.DataFrame, columns: list[str], name: str, what: str) -> Grouping:
@@ -159,7 +169,7 @@ def _grouping(rows: pd.DataFrame, columns: list[str], name: str, what: str) -> G
             "column whose values repeat"
         )
     shown = tuple(str(text).replace("\x1f", "/") for text in names)
-    return Grouping(name, shown, codes.astype(np.int64))
+    return Grouping(name, shown, codes.astype(np.int64), tuple(columns))
 
 
 def _refuse_same(group: Grouping, before: list[Grouping]) -> None:

@@ -18,7 +18,9 @@ from analysis.models.columns import (
     ratings,
     refuse_unknown_columns,
 )
+from analysis.models.formula import formula_name
 from analysis.models.reml import Term, intercept_term
+from analysis.read.number_columns import holds_numbers
 from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
 from analysis.within.level_codes import level_codes
 from experiments.errors import InputError
@@ -176,10 +178,22 @@ class ModelData:
     @property
     def fixed_part(self) -> str:
         """The right-hand side of the formula, without random terms."""
-        factorial = [" * ".join(self.factors)] if self.factors else []
-        if self.terms.effects is not None:
-            factorial = self.factorial_effects
-        return " + ".join([*factorial, *(effect.name for effect in self.number_effects)]) or "1"
+        factorial = list(map(self.in_formula, self.factorial_effects))
+        # a + b + a:b is written a * b.
+        if factorial and len(factorial) == 2 ** len(self.factors) - 1:
+            factorial = [" * ".join(map(self.in_formula, self.factors))]
+        numbers = [self.in_formula(effect.name) for effect in self.number_effects]
+        return " + ".join([*factorial, *numbers]) or "1"
+
+    def in_formula(self, effect: str) -> str:
+        """An effect as `--formula` and R read it: factor(blur) where the levels are numbers."""
+        if effect == "intercept":
+            return "1"
+        levels = dict(zip(self.factors, self.levels, strict=True))
+        return ":".join(
+            f"factor({formula_name(name)})" if holds_numbers(levels.get(name, ())) else formula_name(name)
+            for name in effect.split(":")
+        )
 
     @property
     def x(self) -> Floats:
@@ -299,7 +313,8 @@ class ModelData:
 
     def correlated_effects(self, effects: Sequence[str]) -> list[str]:
         """The intercept and covariates among participants' terms, which correlate; nothing without these."""
-        sloped = [name for name in effects if name in self.covariate_slopes]
+        may = self.terms.correlated_slopes
+        sloped = [name for name in effects if name in (self.covariate_slopes if may is None else may)]
         return ["intercept", *sloped] if sloped else []
 
     def _further_term(self, group: Grouping, slopes: RandomSlopes) -> Term:

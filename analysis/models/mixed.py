@@ -88,6 +88,7 @@ def fit_mixed(
     effects: Sequence[str] | None = None,
     slope_effects: Sequence[str] = (),
     group_slopes: Sequence[tuple[str, tuple[str, ...]]] = (),
+    correlated_slopes: Sequence[str] | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> MixedResult:
     """Fit rating ~ full factorial of the factors + covariates with crossed random groupings by REML.
@@ -137,6 +138,9 @@ def fit_mixed(
         The effects with by-participant slopes, correlated if `slopes` says so; default: as `slopes` says.
     group_slopes : sequence of (str, tuple of str), optional
         Further groupings, such as the item, with the effects that differ between their levels, uncorrelated.
+    correlated_slopes : sequence of str, optional
+        The covariates whose by-participant slopes correlate with the intercept where `slopes` is `all` or
+        `main`; default: every covariate with such a slope.
     progress : callable, optional
         Takes a word on every interval before it is computed.
 
@@ -160,6 +164,7 @@ def fit_mixed(
         None if effects is None else tuple(effects),
         tuple(slope_effects) or None,
         tuple(group_slopes),
+        None if correlated_slopes is None else tuple(correlated_slopes),
     )
     data = model_data(rows, terms)
     sloped, notes = slope_groups(data, slopes)

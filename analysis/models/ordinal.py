@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.models.columns import ModelTerms, Slopes, split_covariates
 from analysis.models.design import ModelData, model_data, refuse_group_slopes, slope_groups, unmodelled_slopes
+from analysis.models.formula import formula_name
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
 from analysis.models.means import Estimate, ModelMeans, RatioTest, model_means, ratio_tests
 from analysis.models.ordinal_maximum import (
@@ -25,6 +26,7 @@ from analysis.models.ordinal_maximum import (
     newton_step,
     pooled_start,
 )
+from analysis.models.random_part import group_in_formula, random_bracket
 from analysis.models.residuals import ResidualChecks, ordinal_checks
 from experiments.errors import InputError
 
@@ -201,11 +203,11 @@ def _component_names(
 
 
 def _formula(data: ModelData, terms: RandomTerms) -> str:
-    parts = [
-        f" + ({'1' if effect == 'intercept' else f'0 + {effect}'} | {group})"
-        for group, effect in _component_names(data, terms.groups, terms.of_items)
-    ]
-    return f"{data.terms.rating} ~ {data.fixed_part}{''.join(parts)}, logit"
+    of_people = random_bracket(data, terms.groups, "||", formula_name(data.terms.participant))
+    parts = [formula_name(data.terms.rating) + f" ~ {data.fixed_part}", of_people]
+    if data.items:
+        parts.append(random_bracket(data, terms.of_items, "||", group_in_formula(data.items)))
+    return " + ".join(parts)
 
 
 # Ratings that a factor separates: no finite coefficient has the highest likelihood.

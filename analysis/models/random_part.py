@@ -12,6 +12,7 @@ from scipy import optimize
 from analysis.models.columns import Grouping, RandomSlopes, Slopes
 from analysis.models.design import ModelData
 from analysis.models.fixed_effect_tests import Uncertainty
+from analysis.models.formula import formula_name
 from analysis.models.means import ModelMeans, RatioTest
 from analysis.models.reml import CrossProducts, criterion
 from analysis.models.residuals import ResidualChecks
@@ -234,23 +235,30 @@ def terms_of(data: ModelData, group: Grouping, slopes: RandomSlopes) -> list[str
 
 
 def formula_of(data: ModelData, labels: list[str], slopes: Slopes, random_slopes: RandomSlopes) -> str:
-    """The model as R writes it."""
-    person = data.terms.participant
+    """The model as `--formula` reads it."""
+    person = formula_name(data.terms.participant)
     shared = labels if slopes == "correlated" else data.correlated_effects(labels)
     rest = [label for label in labels if label not in shared]
-    parts = [f"({_in_formula(shared)} | {person})"] if shared else []
-    if rest:
-        parts.append(f"({'0 + ' if shared else ''}{_in_formula(rest)} || {person})")
-    of_people = " + ".join(parts)
-    others = ""
-    for group in data.groups[1:]:
-        terms = terms_of(data, group, random_slopes)
-        others += f" + ({_in_formula(terms)} {'||' if len(terms) > 1 else '|'} {group.name})"
-    return f"{data.terms.rating} ~ {data.fixed_part} + {of_people}{others}"
+    parts = [random_bracket(data, shared, "|", person)] if shared else []
+    if shared and rest:
+        parts.append(f"(0 + {' + '.join(map(data.in_formula, rest))} || {person})")
+    elif rest:
+        parts.append(random_bracket(data, rest, "||", person))
+    parts += [
+        random_bracket(data, terms_of(data, group, random_slopes), "||", group_in_formula(group))
+        for group in data.groups[1:]
+    ]
+    return f"{formula_name(data.terms.rating)} ~ {data.fixed_part} + {' + '.join(parts)}"
 
 
-def _in_formula(labels: Sequence[str]) -> str:
-    return " + ".join("1" if label == "intercept" else label for label in labels)
+def random_bracket(data: ModelData, labels: Sequence[str], bars: str, grouping: str) -> str:
+    """A grouping with its intercept and slopes: (1 + a || clip), or (1 | clip) without slopes."""
+    return f"({' + '.join(map(data.in_formula, labels))} {bars if len(labels) > 1 else '|'} {grouping})"
+
+
+def group_in_formula(group: Grouping) -> str:
+    """The columns of a grouping as a formula names them."""
+    return ":".join(map(formula_name, group.columns))
 
 
 def components_of_people(

@@ -8,6 +8,7 @@ from functools import partial
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any
 
+from analysis.models.formula import SLOPES_NOTE
 from analysis.plans.result import Analysis, Labels
 from analysis.report.contents import Section, caption
 from analysis.report.formats import Table
@@ -28,10 +29,6 @@ _MOVED = re.compile(
     r"(?P<names>.+)(?P<said>: one level per participant, treated as a factor between participants)"
 )
 _SLOPES = ("slope", "slopes", "test")
-SLOPES = (
-    "Slopes: orthogonal contrasts of unit variance; the contrasts of one effect share one variance, "
-    "uncorrelated."
-)
 
 
 def notes_of(result: "MixedResult | OrdinalResult", labels: Labels) -> tuple[str, ...]:
@@ -45,7 +42,7 @@ def notes_of(result: "MixedResult | OrdinalResult", labels: Labels) -> tuple[str
     slopes = any(one.term not in ("", "intercept") for one in result.components)
     return (
         *sds,
-        *((SLOPES,) if slopes and result.slopes != "correlated" else ()),
+        *((SLOPES_NOTE,) if slopes and result.slopes != "correlated" else ()),
         *(_in_labels(note, result, labels) for note in result.notes),
     )
 
@@ -323,7 +320,11 @@ def ordinal_model(analysis: Analysis) -> Section:
         rows.append((analysis.labels.effect(ours.factors), *cells))
     header = ("Effect", "χ²", "df", "p", "p of the ANOVA")
     thresholds = ", ".join(fixed(value) for value in result.thresholds)
-    notes = (f"Model: {result.formula}.", f"Thresholds: {thresholds}.", *notes_of(result, analysis.labels))
+    notes = (
+        f"Model: {result.formula}, logit link.",
+        f"Thresholds: {thresholds}.",
+        *notes_of(result, analysis.labels),
+    )
     table = Table(
         "ordinal",
         caption("Ordinal mixed model", analysis.name, analysis.synthetic),

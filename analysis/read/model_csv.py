@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.models.columns import split_covariates
+from analysis.models.columns import columns_of, split_covariates
 from analysis.read.number_columns import IN_COVARIATE, holds_numbers, numbers, unusual_numbers
 from analysis.read.reading import EXPORT_COLUMNS, report_visits, rows_that_count
 from analysis.read.text_table import TextTable, read_text_table, texts_required
@@ -67,7 +67,7 @@ def read_model_input(
         )
     covariates, _ = split_covariates(covariates, (*within, *between))
     _refuse_shared_roles(participant, rating, [*within, *between, *covariates], item)
-    nested = list(dict.fromkeys(part for name in random for part in name.split("/")))
+    nested = list(dict.fromkeys(part for name in random for part in columns_of(name)))
     texts = list(dict.fromkeys((participant, *within, *between, *item, *nested)))
     table = read_text_table(path, list(dict.fromkeys([*texts, rating, *covariates])), EXPORT_COLUMNS)
     for name in texts:

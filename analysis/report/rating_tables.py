@@ -3,6 +3,7 @@
 from functools import partial
 
 from analysis.agreement import Agreement, Reliability
+from analysis.models.formula import SLOPES_NOTE
 from analysis.models.ordinal import OrdinalResult
 from analysis.models.random_part import MixedResult
 from analysis.models.residuals import ResidualChecks
@@ -147,9 +148,17 @@ def mixed_text(result: MixedResult) -> str:
     said = [
         f"{result.formula}, fitted by REML (criterion {result.reml_criterion:.2f}) to {result.n_ratings} "
         f"ratings {of_items}by {result.n_participants} participants. Type III tests with "
-        f"{DF_NAMES[result.df_method]} degrees of freedom."
+        f"{DF_NAMES[result.df_method]} degrees of freedom.",
+        *_slopes_note(result),
     ]
     return " ".join([*said, *map(as_sentence, result.notes)])
+
+
+def _slopes_note(result: MixedResult | OrdinalResult) -> tuple[str, ...]:
+    """What || stands for in the formula, where it stands next to a factor."""
+    slopes = {name for c in result.components if c.term != "intercept" for name in c.term.split(":")}
+    of_factors = "||" in result.formula and not slopes.isdisjoint(result.factors)
+    return (SLOPES_NOTE,) if of_factors else ()
 
 
 def _integral(nodes: int) -> str:
@@ -170,8 +179,9 @@ def residuals_table(checks: ResidualChecks, name: str, synthetic: bool = False) 
 def ordinal_text(result: OrdinalResult) -> str:
     """What was fitted, in words."""
     said = [
-        f"{result.formula} link, flexible thresholds, {_integral(result.quadrature)} (log-likelihood "
-        f"{result.log_likelihood:.2f}, AIC {result.aic:.2f}). Wald tests."
+        f"{result.formula}, logit link, flexible thresholds, {_integral(result.quadrature)} (log-likelihood "
+        f"{result.log_likelihood:.2f}, AIC {result.aic:.2f}). Wald tests.",
+        *_slopes_note(result),
     ]
     if result.slopes == "none" and result.effects:
         said.append(

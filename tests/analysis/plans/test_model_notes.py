@@ -3,11 +3,12 @@
 import numpy as np
 import pandas as pd
 
+from analysis.models.formula import SLOPES_NOTE
 from analysis.models.mixed import fit_mixed
 from analysis.models.ordinal import fit_ordinal
 from analysis.models.random_part import MixedResult
 from analysis.plans.result import Labels
-from analysis.plans.sensitivity import SLOPES, notes_of
+from analysis.plans.sensitivity import notes_of
 
 LABELS = Labels({"fit": "Fit quality", "residual": "Left over"})
 
@@ -38,7 +39,7 @@ def test_terms_have_labels_and_words_like_a_factor_have_none() -> None:
     assert ", Left over " in sds
     assert ", Fit quality × Left over " in sds
     assert "; residual " in sds
-    assert slopes == SLOPES
+    assert slopes == SLOPES_NOTE
     assert zero[0].startswith(
         "singular fit: the slope variance of participant Fit quality × Left over is estimated as zero, so "
         "that the test of Fit quality × Left over is against the residual (df = "
