@@ -65,10 +65,10 @@ class LevelLeak:
 
     def __str__(self) -> str:
         return (
-            f"the level '{self.level}' of '{self.factor}' can be recognized by the {self.feature} alone: "
-            f"a guess from it is right for {self.right:.0%} of the level's clips and for "
-            f"{self.others:.0%} of the others ({self.clips} clips). An effect of '{self.factor}' may be due "
-            f"to this: equalize the clips in it, unless it is what '{self.factor}' varies"
+            f"clips of the level '{self.level}' of '{self.factor}' differ from the others in the "
+            f"{self.feature}: by this alone, {self.right:.0%} of them and {self.others:.0%} of the others "
+            f"are recognized ({self.clips} clips). If '{self.factor}' varies it on purpose, leave it. "
+            f"Otherwise raters may judge it instead: make all levels with the same {self.feature}"
         )
 
 

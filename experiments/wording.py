@@ -167,11 +167,14 @@ class UnfilledText(NamedTuple):
     ----------
     path : str
         As the TOML has it, with the language: `texts.en.consent`.
+    place : str
+        The same in the words of the pages: `the text "Consent"`.
     certain : bool
         False if the marks may be intended.
     """
 
     path: str
+    place: str
     language: str
     marks: tuple[str, ...]
     certain: bool
@@ -182,12 +185,13 @@ class UnfilledText(NamedTuple):
         rest = f" and {more} more" if more > 0 else ""
         one = len(self.marks) == 1
         if not self.certain:
-            of = f"{self.path} (language {self.language})"
+            of = f"{_capitalized(self.place)} (language {self.language})"
             return f"{of} has {named}{rest}. Should this be filled in before participants read it?"
         return (
-            f"{self.path} (language {self.language}) still has {'a placeholder' if one else 'placeholders'} "
-            f"to fill in: {named}{rest}. Replace {'it' if one else 'each'}, or put `backticks` "
-            f"around {'it' if one else 'one'} that participants should read unchanged."
+            f"{_capitalized(self.place)} (language {self.language}) still has "
+            f"{'a placeholder' if one else 'placeholders'} to fill in: {named}{rest}. Replace "
+            f"{'it' if one else 'each'}, or put `backticks` around {'it' if one else 'one'} that "
+            "participants should read unchanged."
         )
 
 
@@ -200,10 +204,11 @@ def unfilled_texts(declared: Experiment) -> list[UnfilledText]:
         plain = _LINK.sub(" ", _CODE.sub(" ", text))
         if path.startswith("attention.text"):
             plain = plain.replace("{response}", " ")  # the page fills it in
+        place = place_in_words(declared, path)
         if certain := tuple(dict.fromkeys(_certain(plain))):
-            texts.append(UnfilledText(path, language, certain, certain=True))
+            texts.append(UnfilledText(path, place, language, certain, certain=True))
         elif doubtful := tuple(dict.fromkeys(_DOUBTFUL.findall(_RULE.sub(" ", plain)))):
-            texts.append(UnfilledText(path, language, doubtful, certain=False))
+            texts.append(UnfilledText(path, place, language, doubtful, certain=False))
     return sorted(texts, key=lambda text: not text.certain)
 
 
@@ -214,6 +219,48 @@ def _certain(text: str) -> Iterator[str]:
             yield match[0]
     for pattern in (_BRACES, _WORDS):
         yield from pattern.findall(text)
+
+
+_NOUNS = {
+    "factors": "factor",
+    "levels": "level",
+    "forms": "questionnaire",
+    "fields": "question",
+    "options": "answer",
+    "scales": "scale",
+}
+
+
+def place_in_words(declared: Experiment, path: str) -> str:
+    """The place of a text as the builder calls it: `"Label" of the question age of the questionnaire about`.
+
+    >>> place_in_words(Experiment.model_construct(), "texts.en.block_break")
+    'the text "Block break"'
+    """
+    first, *rest = path.split(".")
+    if first == "texts":
+        return f'the text "{_label_of(rest[-1])}"'
+    places: list[str] = []
+    value: Any = declared
+    key = ""
+    for part in path.split("."):
+        if isinstance(value, tuple):
+            value = value[int(part) - 1]
+            name = getattr(value, "name", "") or getattr(value, "value", "") or part
+            places[-1] = f"the {_NOUNS[key]} {name}" if key in _NOUNS else f'"{_label_of(key)}" {part}'
+        elif isinstance(value, BaseModel):
+            value, key = getattr(value, part), part
+            places.append(f'"{_label_of(part)}"')
+    return " of ".join(reversed(places))
+
+
+def _label_of(key: str) -> str:
+    """How the builder labels a key: `block_break` is "Block break"."""
+    return _capitalized(key.replace("_", " "))
+
+
+def _capitalized(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 class ParticipantText(NamedTuple):

@@ -16,6 +16,7 @@ from experiments.manifest import CheckClip, Clip, Manifest
 from experiments.wording import (
     LEAST_HOURLY_PAY,
     MINUTES_TOLERANCE,
+    place_in_words,
     silent_on_contact,
     silent_on_flicker,
     stated_minutes,
@@ -189,10 +190,11 @@ def _translations(launch: LaunchState) -> Iterator[LaunchCheck]:
     """Texts that participants read in another language than they chose."""
     first = launch.experiment.languages[0]
     for language, paths in untranslated(launch.experiment).items():
+        places = [place_in_words(launch.experiment, path) for path in paths]
         yield LaunchCheck(
             kind="translations",
             blocks=False,
-            text=f"Participants who choose the language {language} read {', '.join(paths)} in {first}: "
+            text=f"Participants who choose the language {language} read {', '.join(places)} in {first}: "
             f"{'this text has' if len(paths) == 1 else 'these texts have'} no translation.",
             page="build",
             path=paths[0],

@@ -66,10 +66,13 @@ def test_marks_that_may_be_meant_as_they_are_do_not_block(mark: str) -> None:
 def test_questions_labels_and_titles_are_looked_at_too() -> None:
     text = SHORT.replace("How natural?", "How [adjective]?").replace("Glasses", "[Option]")
     text = text.replace('title = "A short study"', 'title = "[Title]"')
-    assert [found.path for found in unfilled_texts(parse_experiment(text))] == [
-        "title",
-        "trial.scale.question.en",
-        "forms.1.fields.2.options.1.label.en",
+    assert [(found.path, found.place) for found in unfilled_texts(parse_experiment(text))] == [
+        ("title", '"Title"'),
+        ("trial.scale.question.en", '"Question" of "Scale" of "Trial"'),
+        (
+            "forms.1.fields.2.options.1.label.en",
+            '"Label" of the answer glasses of the question glasses of the questionnaire about',
+        ),
     ]
 
 

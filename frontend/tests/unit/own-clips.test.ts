@@ -20,7 +20,7 @@ import {
 import { begun, edited } from "../../src/admin/builder/history";
 import { clipFindings, factsOf, pictureProblems, repeatedFiles } from "../../src/admin/clips/examine";
 import { sizeRemark } from "../../src/admin/clips/UploadClips";
-import { languageFindings, summaryOf } from "../../src/admin/studies/Preflight";
+import { languageFindings, ranked, summaryOf } from "../../src/admin/studies/Preflight";
 import { matching } from "../../src/admin/studies/StudiesPage";
 import { expectedReturn, isReturn, testAddress } from "../../src/admin/studies/SelfTest";
 import { nextStep } from "../../src/admin/studies/StatusBadge";
@@ -256,6 +256,15 @@ describe("the checklist", () => {
     expect(summaryOf([])).toBe("Nothing speaks against going live.");
     expect(summaryOf([finding("a")])).toBe("1 thing to check. None of them prevents going live.");
     expect(summaryOf([finding("a", true), finding("b", true), finding("c")])).toBe("2 to fix before it goes live, 1 to check.");
+  });
+
+  it("lists what stops a study first, then what spoils answers, and names the checks that found nothing", () => {
+    const of = (kind: string, blocks = false) => ({ kind, blocks, text: kind, page: "clips" as const, path: "" });
+    const { fix, look, fine } = ranked([of("backups"), of("plan"), of("clip_still"), of("contact"), of("placeholders", true)]);
+    expect(fix.map(({ kind }) => kind)).toEqual(["placeholders"]);
+    expect(look.map(({ kind }) => kind)).toEqual(["clip_still", "contact", "plan", "backups"]);
+    expect(fine).toContain("Rehearsal");
+    expect(fine).not.toContain("Backups");
   });
 
   it("names languages in which the page has no words, or unreviewed ones", () => {

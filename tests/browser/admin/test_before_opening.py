@@ -62,7 +62,15 @@ def test_unfilled_placeholders_keep_the_study_from_going_live(dashboard: Dashboa
     page = dashboard.open("/studies/unfilled")
     page.get_by_role("button", name="Set live").click()
     dialog = page.get_by_role("dialog")
-    expect(dialog.get_by_text("texts.en.consent")).to_contain_text("[Title], [topic], [name]")
+    fix = dialog.get_by_role("list", name="Fix first").get_by_role("listitem")
+    expect(fix).to_contain_text(
+        ['The text "Consent" (language en) still has placeholders to fill in: [Title]']
+    )
+    expect(dialog).not_to_contain_text("texts.en")
+    fine = dialog.get_by_text("Completion code;")
+    expect(fine).to_be_hidden()
+    dialog.get_by_text(re.compile(r"^Nothing found by \d+ other checks")).click()
+    expect(fine).to_be_visible()
     expect(dialog.get_by_role("button", name="Set live")).to_be_disabled()
     picture(page, "unfilled")
     dialog.get_by_role("button", name="Cancel").click()
@@ -230,7 +238,7 @@ def test_the_checklist_of_the_studys_page_leads_to_where_each_fault_is_fixed(
     assert axe_violations(page) == []
     picture(page, "faulty-page")
     for words, link, address in (
-        ("texts.en.consent", "Build, Texts", "build?section=texts"),
+        ('The text "Consent"', "Build, Texts", "build?section=texts"),
         ("No limit is set", "Settings", "settings"),
         ("plan is not sealed", "Data", "data"),
         ("No rehearsal was made", "Rehearsal", "rehearsal"),

@@ -216,6 +216,10 @@ def test_a_threshold_names_the_numbers_it_lacks_before_it_is_made(
     page.get_by_role("radio", name="Rating on seven points").click()
     expect(lacks).to_have_count(0)
     page.get_by_role("button", name="Start over").click()
+    Hand(page).bring(clips)
+    page.get_by_text("12 clips received").wait_for()
+    expect(page.get_by_label("Title of the study")).to_have_value("Numbers")
+    page.get_by_role("button", name="Start over").click()
 
 
 def test_a_demonstration_is_built_by_a_button_and_made_a_study(dashboard: Dashboard) -> None:

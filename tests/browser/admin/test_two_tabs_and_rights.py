@@ -87,7 +87,7 @@ def test_a_field_that_both_changed_is_chosen_by_the_second(dashboard: Dashboard,
     second.get_by_role("button", name=SAVE).click()
     expect(second.get_by_text(re.compile(r"Saved as version \d+"))).to_be_visible()
     first.get_by_role("button", name=SAVE).click()
-    field = first.get_by_role("group", name="texts.en.debrief", exact=True)
+    field = first.get_by_role("group", name="The text “Debrief” in English (en)", exact=True)
     expect(field).to_contain_text("Words of the second.; yours: Words of the first.")
     expect(first.get_by_label(DEBRIEF)).to_have_value("Words of the first.")
     field.get_by_text(re.compile(r"^Version \d+$")).click()

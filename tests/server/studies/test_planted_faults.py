@@ -195,9 +195,12 @@ FAULTS: dict[str, Fault] = {
     "a doubtful mark": Fault("placeholders", "<name>", (("Ada Lovelace", "<name>"),)),
     "a mark in a question": Fault("placeholders", "TODO", (('"Age"', '"TODO"'),), blocks=True),
     "a mark in the second language": Fault(
-        "placeholders", "texts.de.consent", (TWO_LANGUAGES, ("Dauer: 5 Minuten", "[Dauer]")), blocks=True
+        "placeholders",
+        '"Consent" (language de)',
+        (TWO_LANGUAGES, ("Dauer: 5 Minuten", "[Dauer]")),
+        blocks=True,
     ),
-    "a text without its translation": Fault("translations", "forms.1.title", (TWO_LANGUAGES,)),
+    "a text without its translation": Fault("translations", '"Title" of the questionnaire', (TWO_LANGUAGES,)),
     # What the consent promises.
     "no contact": Fault("contact", "no e-mail address", (("Ada Lovelace, ada@example.org", "ask us"),)),
     "no time": Fault("time", "does not say how long", ((CONSENT_TIME, "It is short."),)),

@@ -8,7 +8,7 @@ import { api, type Schemas, unwrap } from "../api";
 import { ConfirmButton } from "../ui/ConfirmButton";
 import { counted, plain, when } from "../ui/format";
 import { isTable } from "./data";
-import { changesBetween, placeName } from "./history";
+import { changesBetween, placeInWords, placeName } from "./history";
 import { type Draft, isUnsaved, keptFrom, otherWork, tab, tabOf } from "./kept";
 import type { Builder } from "./useBuilder";
 
@@ -163,7 +163,7 @@ function Difference({ detail, draft }: { detail: Schemas["StudyDetail"]; draft: 
       <List size="sm">
         {changes.slice(0, MAX_CHANGES).map((change) => (
           <List.Item key={placeName(change.at)} className="wrap-anywhere">
-            {`${placeName(change.at)}: ${shortly(change.before)} becomes ${shortly(change.after)}`}
+            {`${placeInWords(change.at)}: ${shortly(change.before)} becomes ${shortly(change.after)}`}
           </List.Item>
         ))}
       </List>

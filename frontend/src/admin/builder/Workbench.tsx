@@ -12,10 +12,10 @@ import { DesignLine, TomlText } from "../studies/Design";
 import { TurnedAway } from "../studies/StatusBadge";
 import { onDemand } from "../ui/Answer";
 import { useChange } from "../ui/useChange";
-import { isTable, placeOf, type Section } from "./data";
+import { isTable, placeOf, placeTitle, type Section } from "./data";
 import { Field } from "./fields/Field";
 import { Forms, Texts } from "./Forms";
-import { type Meeting, type MeetingEdit, placeName, withChange } from "./history";
+import { type Meeting, type MeetingEdit, placeInWords, placeName, withChange } from "./history";
 import { forgetUpload } from "../clips/useUpload";
 import { forgetWork } from "./kept";
 import { type ClipMeeting, placesToSave } from "./places";
@@ -61,8 +61,7 @@ function JudgedEdit({ detail, builder }: { detail: Schemas["StudyDetail"]; build
 /** "The text “Consent” in English: A becomes B", of a text that names the key as the TOML has it. */
 function inWords({ path, text }: Schemas["JudgedEdit"]["changes"][number]): string {
   if (!text.startsWith(path)) return text;
-  const name = placeOf(path.split("."));
-  return `${name.charAt(0).toUpperCase()}${name.slice(1)}${text.slice(path.length)}`;
+  return `${placeTitle(path.split("."))}${text.slice(path.length)}`;
 }
 
 /** What is saved, and judged before: the text, and the clips if some were moved. */
@@ -188,7 +187,7 @@ function Met({ meeting: { both, theirs, lostComments = [], clips }, version }: {
           <List size="sm">
             {theirs.map((change) => (
               <List.Item key={placeName(change.at)} className="wrap-anywhere">
-                {placeName(change.at)}: {shortly(change.after)}
+                {placeInWords(change.at)}: {shortly(change.after)}
               </List.Item>
             ))}
           </List>
@@ -207,13 +206,13 @@ function Met({ meeting: { both, theirs, lostComments = [], clips }, version }: {
       {clips !== undefined && moved.both.length > 0 && <MetClips clips={clips} version={version} />}
       {both.length > 0 && <Text size="sm">You both changed {counted(both.length, "field")}. Choose what stays:</Text>}
       {both.map((edit) => (
-        <Stack key={edit.path} gap={4} mt="xs" role="group" aria-label={edit.path}>
+        <Stack key={edit.path} gap={4} mt="xs" role="group" aria-label={placeTitle(edit.path.split("."))}>
           <Text size="sm" className="wrap-anywhere">
-            <code>{edit.path}</code> in version {version}: {shortly(edit.theirs.after)}; yours: {shortly(edit.mine.after)}
+            {placeTitle(edit.path.split("."))} in version {version}: {shortly(edit.theirs.after)}; yours: {shortly(edit.mine.after)}
           </Text>
           <SegmentedControl
             size="xs"
-            aria-label={`What stays of ${edit.path}`}
+            aria-label={`What stays of ${placeOf(edit.path.split("."))}`}
             style={{ alignSelf: "flex-start" }}
             value={taken.includes(edit.path) ? "theirs" : "mine"}
             onChange={(whose) => choose(edit, whose)}
@@ -463,7 +462,7 @@ function Wrong({ study, builder }: { study: string; builder: Builder }) {
       {builder.problems.slice(0, 12).map((problem) => (
         <Text size="sm" key={`${problem.path}${problem.message}`}>
           <Link to="/studies/$study/build" params={{ study }} search={{ section: sectionOf(problem.path)?.id ?? "study" }}>
-            {problem.path || "TOML"}
+            {problem.path === "" ? "TOML" : placeTitle(problem.path.split("."))}
             {problem.line !== null && ` (line ${problem.line})`}
           </Link>
           : {problem.message}

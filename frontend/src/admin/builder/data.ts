@@ -107,6 +107,12 @@ export function placeOf([part = "", name, ...rest]: string[]): string {
   return inner.length === 0 ? here : `${placeOf(inner)} of ${here}`;
 }
 
+/** As `placeOf`, at the beginning of a line. */
+export function placeTitle(path: string[]): string {
+  const name = placeOf(path);
+  return `${name.charAt(0).toUpperCase()}${name.slice(1)}`;
+}
+
 /** One of several: "factors" are made of factors, "categories" of categories, and a series is one of "series". */
 export function singularOf(plural: string): string {
   const words = plural.split(" ");

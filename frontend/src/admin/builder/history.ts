@@ -1,5 +1,5 @@
 /** States of a declaration under edit, with undo and redo; edits of two people that meet. */
-import { type Data, isTable, type Path, pathName, textAt, withDerivedName, withValue } from "./data";
+import { type Data, isTable, type Path, pathName, placeTitle, textAt, withDerivedName, withValue } from "./data";
 import { type ClipMeeting, hasOwnNames, type Place, withRenames } from "./places";
 
 /** Clips in cells, null as stored; and those that are stored. */
@@ -154,6 +154,11 @@ function contentAt(data: unknown, at: readonly Step[]): unknown {
 /** "forms.about.fields.age.minimum" */
 export function placeName(at: readonly Step[]): string {
   return at.map((step) => (typeof step === "string" ? step : step.named)).join(".");
+}
+
+/** "“Minimum” of the question age of the questionnaire about" */
+export function placeInWords(at: readonly Step[]): string {
+  return placeTitle(at.map((step) => (typeof step === "string" ? step : step.named)));
 }
 
 function isWithin(inner: readonly Step[], outer: readonly Step[]): boolean {

@@ -11,6 +11,7 @@ import { type ComponentProps, useState, useRef } from "react";
 import { UploadClips, StillNeeded } from "../clips/UploadClips";
 import { playNeeded, useUpload } from "../clips/useUpload";
 import { Answer, onDemand } from "../ui/Answer";
+import type { Asked } from "./Levels";
 import { TemplateCards, TEMPLATES } from "./templates";
 
 // TOML with its problems, checked while typing, and what it expands to.
@@ -143,6 +144,8 @@ function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: stri
   const upload = useUpload("new study");
   const { last, received } = upload;
   const [template, setTemplate] = useState(TEMPLATES[0]);
+  // What was written about the study stays where the upload starts over.
+  const [asked, setAsked] = useState<Asked>({ title: "", question: null, low: "very unnatural", high: "very natural" });
   return (
     <Stack>
       <UploadClips upload={upload} />
@@ -152,6 +155,8 @@ function FromOwnClips({ name, onTaken }: { name: string; onTaken: (message: stri
           key={last.id}
           name={name}
           template={template}
+          asked={asked}
+          onAsk={setAsked}
           upload={last}
           isLooked={received !== null}
           notPlayed={playNeeded(upload)}

@@ -42,9 +42,19 @@ const WAYS: Readonly<Record<string, string>> = {
   csv: "Paste a table with one row per clip.",
 };
 
+/** What is written about the study; until a question is written, it is the template's. */
+export interface Asked {
+  title: string;
+  question: string | null;
+  low: string;
+  high: string;
+}
+
 interface LevelsProps {
   name: string;
   template: TemplateWords;
+  asked: Asked;
+  onAsk: (asked: Asked) => void;
   upload: Schemas["UploadOut"];
   /** Whether every file has been looked into. */
   isLooked: boolean;
@@ -56,13 +66,11 @@ interface LevelsProps {
   onCreate: (study: Schemas["NewStudy"]) => void;
 }
 
-export function Levels({ name, template, upload, isLooked, notPlayed, refused, isCreating, onCreate }: LevelsProps) {
+export function Levels({ name, template, asked: typed, onAsk, upload, isLooked, notPlayed, refused, isCreating, onCreate }: LevelsProps) {
   // As the files suggest it, also after one was left out or came, until it is written.
   const [written, setWritten] = useState<{ pattern?: string; csv?: string }>({});
   const pattern = written.pattern ?? upload.suggested_pattern ?? "";
   const csv = written.csv ?? tableToFill(upload.files.map((file) => file.name));
-  // Until a question is written, it is the template's.
-  const [typed, setAsked] = useState({ title: "", question: null as string | null, low: "very unnatural", high: "very natural" });
   const asked = { ...typed, question: typed.question ?? template.question };
   const [names, setNames] = useState<Record<string, string>>({});
   const files = upload.files.map((file) => file.name);
@@ -89,7 +97,7 @@ export function Levels({ name, template, upload, isLooked, notPlayed, refused, i
     asked.title.trim() === "" && "a title of the study",
   ];
   const field = (key: keyof typeof asked, label: string) => (
-    <TextInput label={label} value={asked[key]} onChange={(event) => setAsked({ ...typed, [key]: event.currentTarget.value })} />
+    <TextInput label={label} value={asked[key]} onChange={(event) => onAsk({ ...typed, [key]: event.currentTarget.value })} />
   );
   return (
     <Stack>

@@ -82,20 +82,79 @@ export function languageFindings(languages: readonly string[]): Finding[] {
   ];
 }
 
+/** Checks of the server in the order in which their findings are listed: what spoils answers, people, then the way there. */
+const CHECKS: readonly (readonly [kind: string, words: string])[] = [
+  ["placeholders", "Texts to fill in"],
+  ["completion_code", "Completion code"],
+  ["levels_told_apart", "Clips that give their level away"],
+  ["doubtful_trial", "Task of a trial"],
+  ["clip_size", "Size of clips in small windows"],
+  ["contact", "Contact in the consent text"],
+  ["time", "Duration in the consent text"],
+  ["pay", "Pay"],
+  ["flicker", "Flicker in the consent text"],
+  ["translations", "Translations"],
+  ["page_language", "Language of buttons"],
+  ["person_checks", "Checks that a participant is a person"],
+  ["recruiter", "Recruiter"],
+  ["paused", "Pause"],
+  ["quota", "Limit of participants"],
+  ["not_tried", "Preview by a person"],
+  ["rehearsal", "Rehearsal"],
+  ["plan", "Seal of the analysis plan"],
+  ["address", "Address of the server"],
+  ["backups", "Backups"],
+  ["disk", "Disk"],
+];
+
+/** The place of a finding: clips, which are not in the list of checks, before all but texts and codes. */
+const rankOf = ({ blocks, kind }: Finding) => (blocks ? 0 : 100) + (CHECKS.findIndex(([of]) => of === kind) + 1 || 2.5);
+
+/** Findings, those first that stop the study, and what the server checked without finding anything. */
+export function ranked(findings: readonly Finding[]): { fix: Finding[]; look: Finding[]; fine: string[] } {
+  const sorted = [...findings].sort((a, b) => rankOf(a) - rankOf(b));
+  const kinds = new Set(findings.map(({ kind }) => kind));
+  return {
+    fix: sorted.filter(({ blocks }) => blocks),
+    look: sorted.filter(({ blocks }) => !blocks),
+    fine: CHECKS.filter(([kind]) => !kinds.has(kind)).map(([, words]) => words),
+  };
+}
+
 function Findings({ study, findings }: { study: string; findings: readonly Finding[] }) {
-  const sorted = [...findings].sort((a, b) => Number(b.blocks) - Number(a.blocks));
-  if (sorted.length === 0) return null;
+  const { fix, look, fine } = ranked(findings);
   return (
-    <ul className="checklist">
-      {sorted.map((finding) => (
-        <li key={`${finding.kind} ${finding.text}`}>
-          <Badge color={finding.blocks ? "red.9" : "gray.7"}>{finding.blocks ? "fix" : "check"}</Badge>
-          <Text size="sm" className="wrap-anywhere">
-            <Long text={finding.text} /> <Where study={study} finding={finding} />
-          </Text>
-        </li>
-      ))}
-    </ul>
+    <>
+      <Lines title="Fix first" study={study} findings={fix} />
+      <Lines title="Then look at" study={study} findings={look} />
+      {fine.length > 0 && (
+        <details>
+          <summary className="small-summary">Nothing found by {counted(fine.length, "other check")}</summary>
+          <Text size="sm">{fine.join("; ")}.</Text>
+        </details>
+      )}
+    </>
+  );
+}
+
+function Lines({ title, study, findings }: { title: string; study: string; findings: readonly Finding[] }) {
+  if (findings.length === 0) return null;
+  return (
+    <div>
+      <Text size="sm" fw={600} mb={4}>
+        {title} ({findings.length})
+      </Text>
+      <ul className="checklist" aria-label={title}>
+        {findings.map((finding) => (
+          <li key={`${finding.kind} ${finding.text}`}>
+            <Badge color={finding.blocks ? "red.9" : "gray.7"}>{finding.blocks ? "fix" : "check"}</Badge>
+            <Text size="sm" className="wrap-anywhere">
+              <Long text={finding.text} /> <Where study={study} finding={finding} />
+            </Text>
+          </li>
+        ))}
+      </ul>
+    </div>
   );
 }
 
