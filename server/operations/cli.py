@@ -3,12 +3,12 @@
 import json
 from dataclasses import asdict
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
+from textwrap import wrap
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Column, Table
 from rich.text import Text
 
 from experiments.command_groups import command_group
@@ -20,7 +20,7 @@ from server.core.migrate import current_revision, is_up_to_date, newest_revision
 from server.core.settings import Settings
 from server.core.values import iso, now
 from server.operations.copying import address, carry_over, copy_database
-from server.operations.doctor import examine
+from server.operations.doctor import Finding, examine
 from server.operations.snapshots import (
     database_file,
     go_back,
@@ -36,8 +36,8 @@ from server.privacy.rows import Content
 
 # `server doctor` and `server database copy`.
 
-FILE_WIDTH = 1_000
-"""Characters: wider than any finding."""
+WIDTH = 100
+"""Characters of a line; a path or URL that is longer has a line to itself."""
 COLORS = {"ok": "green", "warning": "yellow", "failed": "red"}
 
 
@@ -69,16 +69,23 @@ def doctor(
     if as_json:
         typer.echo(json.dumps([asdict(finding) for finding in findings], indent=2))
     else:
-        whole = (Column(name, overflow="fold") for name in ("found", "what to do"))
-        table = Table("", "what", *whole, box=None, pad_edge=False)
         for finding in findings:
-            table.add_row(
-                Text(finding.verdict, COLORS[finding.verdict]), finding.subject, finding.state, finding.advice
-            )
-        # In a file or a pipe a path is whole on its line; a terminal's own width is for eyes.
-        (out if out.is_terminal else Console(width=FILE_WIDTH, highlight=False, markup=False)).print(table)
+            out.print(_as_lines(finding), soft_wrap=True)
     if any(finding.verdict == "failed" for finding in findings):
         raise typer.Exit(1)
+
+
+def _as_lines(finding: Finding) -> Text:
+    """The verdict, what was found, and what to do on lines of their own; names that are long stay whole."""
+    indent = " " * 9
+    wrapped = partial(wrap, width=min(WIDTH, out.width), break_long_words=False, break_on_hyphens=False)
+    lines = wrapped(
+        f"{finding.subject}: {finding.state}", initial_indent=indent, subsequent_indent=f"{indent}  "
+    )
+    if finding.advice:
+        lines += wrapped(finding.advice, initial_indent=f"{indent}> ", subsequent_indent=f"{indent}  ")
+    shown = Text("\n".join(lines)[len(finding.verdict) :])
+    return Text.assemble((finding.verdict, COLORS[finding.verdict]), shown)
 
 
 def copy(

@@ -137,10 +137,10 @@ def test_commands_bring_the_views_and_say_that_they_differ(
     told = run_server_command(settings, "database", "status").stdout.strip()
     assert told == f"found {newest_revision()} and other views, expected {newest_revision()}{upgraded}"
     doctor = run_server_command(settings, "doctor").stdout
-    assert "server database upgrade" in doctor
+    assert "server database upgrade" in " ".join(doctor.split())
     assert run_server_command(settings, "database", "upgrade").returncode == 0
     assert run_server_command(settings, "database", "status").stdout.strip() == same
-    assert "server database upgrade" not in run_server_command(settings, "doctor").stdout
+    assert "server database upgrade" not in " ".join(run_server_command(settings, "doctor").stdout.split())
 
 
 @both

@@ -71,7 +71,7 @@ def test_nobody_else_on_the_machine_reads_the_data_folder(tmp_path: Path) -> Non
     left.write_text("x")
     left.chmod(0o644)
     assert {path.name for path in open_to_others(settings.data_folder)} >= {"report.html"}
-    said = run_server_command(settings, "doctor").stdout
+    said = " ".join(run_server_command(settings, "doctor").stdout.split())
     assert "open to other users" in said
     assert "chmod -R go=" in said
 
