@@ -17,7 +17,14 @@ from server.cli_common import out, stored_services
 from server.core.settings import Settings
 from server.rehearsals.http import JsonClient, RefusedRequest, running_server
 from server.rehearsals.manners import MANNERS, act, manner_called, summary, write
-from server.rehearsals.person import Person, Rater, link_and_raters
+from server.rehearsals.person import (
+    FAILED_SHARE,
+    FLAGGED_SHARE,
+    SEES_MOTION,
+    Person,
+    Rater,
+    link_and_raters,
+)
 
 
 def register(parent: typer.Typer) -> None:
@@ -106,6 +113,11 @@ def simulate(
         f"study {study}: {counted(participants, 'simulated participant')}, {counted(ratings, 'rating')}, "
         "practice and repeated plays included"
     )
+    out.print(
+        f"As happens with people, {FAILED_SHARE:.0%} of plays fail and are repeated, {FLAGGED_SHARE:.0%} are "
+        f"flagged, and {1 - SEES_MOTION:.0%} of motion checks are guessed. This is by design, so that "
+        "exclusions are rehearsed too."
+    )
 
 
 def _simulate_manner(
@@ -120,6 +132,10 @@ def _simulate_manner(
     if json_file is not None:
         write(json_file, study, name, runs)
     out.print(f"study {study}, {len(runs)} as {name}: {summary(runs)}")
+    if name in ("honest", "assistive"):
+        out.print(f"'{name}' stands for people: likely is the right verdict.")
+    else:
+        out.print(f"'{name}' is made to fail the checks: with any verdict but likely, they have caught it.")
 
 
 def _take_part(address: str, token: str, rater: Rater) -> int:

@@ -49,6 +49,9 @@ def test_a_study_from_files_to_data(settings: Settings, services: Services, sour
     assert re.search(r"http://localhost:8000/run/[\w-]{22}$", added.stdout.strip())
     simulated = run_server_command(settings, "simulate", "short", "--participants", "2", "--seed", "4")
     assert "2 simulated participants" in simulated.stdout, simulated.stderr
+    said = " ".join(simulated.stdout.split())
+    assert "1% of plays fail and are repeated, 3% are flagged" in said
+    assert "by design" in said
     out = sources / "short.csv"
     people = run_server_command(settings, "export", "short", "--out", str(out))
     assert people.returncode == 0, people.stderr
