@@ -54,7 +54,6 @@ if not r_has("afex", "car", "emmeans"):
     EXCEPTIONS["analysis run exp1 --csv exp1.csv --verify-with-r"] = "needs R with afex"
 
 ENDS_WITH_1 = (
-    "analysis check-paper",  # the paper's own figures have faults
     "analysis synthesise exp1 --n 60 --effect blur:amplitude=12.5 --effect character=8",  # the page says so
 )
 """Commands that report something with exit code 1, as their pages say."""
