@@ -331,7 +331,8 @@ def paper_table(analysis: Analysis) -> Table:
         *_pair_notes(analysis),
     ]
     header = ("Factor", "Condition", "Mean (SE)", *(("SD",) if spread else ()), "F", "df", "p")
-    return Table("paper", title_of(analysis, "Ratings by condition"), header, tuple(rows), 2, tuple(notes))
+    title = title_of(analysis, "Mean ratings by condition, with tests of each factor")
+    return Table("paper", title, header, tuple(rows), 2, tuple(notes))
 
 
 def uses_multivariate(analysis: Analysis) -> bool:

@@ -67,7 +67,10 @@ def test_each_scale_has_its_part_and_all_their_reliability(tmp_path, rows) -> No
     assert done.exit_code == 0, done.output
     report = (out / "report.md").read_text(encoding="utf-8")
     assert all(f"## {in_words(scale.name)}" in report for scale in SCALES)
-    assert f"{in_words(SCALES[0].name)}: Ratings by condition, sliders_demo" in report
+    assert (
+        f"{in_words(SCALES[0].name)}: Mean ratings by condition, with tests of each factor, sliders_demo"
+        in report
+    )
 
     numbers = json.loads((out / "results.json").read_text(encoding="utf-8"))
     assert [one["scale"] for one in numbers["scales"]] == [scale.name for scale in SCALES]
