@@ -51,6 +51,7 @@ def methods_figures(session: Session, study: Study, origin: str, series: int | N
         used=used,
         rules=(),
         elsewhere="" if used else _runs_elsewhere(session, study, origin, version.series),
+        is_open=study.status != "closed",
         numbers=numbers(session, study.id, origin, version.series) | declared_numbers(experiment),
     )
     return MethodsFigures(study.name, described)

@@ -143,6 +143,8 @@ class DescribedSeries:
         The versions of the series that visits were begun with, oldest first.
     rules : sequence of (str, str)
         Name of the number and words of each declared exclusion rule that a report has applied.
+    is_open : bool
+        Whether people may still be taking part.
     elsewhere : str
         Where visits are, in words, if this series has none; empty otherwise.
     numbers : dict of str to Number
@@ -156,6 +158,7 @@ class DescribedSeries:
     used: Sequence[tuple[UsedVersion, Experiment]]
     rules: Sequence[tuple[str, str]]
     elsewhere: str
+    is_open: bool
     numbers: dict[str, Number] = field(default_factory=dict)
 
     def value(self, name: str) -> int:
@@ -253,7 +256,8 @@ def _ways_visits_ended(of: DescribedSeries) -> list[str]:
         "withdrew": "{withdrew} {withdrew:was|were} withdrawn by the participant",
         "screened_out": "{screened_out} {screened_out:was|were} screened out",
         "restarted": "{restarted} {restarted:was|were} replaced by a new visit of the same participant",
-        "unfinished": "{unfinished} {unfinished:was|were} not finished",
+        "unfinished": "{unfinished} {unfinished:was|were} not finished"
+        + (" or still under way" if of.is_open else ""),
     }
     ends = [words for name, words in ways.items() if of.value(name)]
     if not ends:

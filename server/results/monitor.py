@@ -1,7 +1,7 @@
 """The live monitor: runs, presence, funnel, expected finish, and clips that participants could not see."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from typing import Any
@@ -70,7 +70,7 @@ def snapshot(
         others=runs_of_other_origins(every, origin),
         refused_browsers=monitor_repository.refused_browsers(session, study),
         groups=group_counts(session, study, experiment, origin, moment - lease),
-        funnel=funnel(counted),
+        funnel=funnel(counted, _stages_without(experiment)),
         expected_finish=expected_finish(by_status["complete"], *recent, study.quota, moment),
         total=sum(kind.runs for kind in counted),
         runs=[monitored_run(run, main[run.id], moment, lease) for run in runs],
@@ -151,14 +151,29 @@ def stage_reached(run: Any) -> str:
     return "done" if run.status == "complete" else str(run.stage)
 
 
-def funnel(kinds: Sequence[RunCount]) -> list[FunnelStep]:
-    """How many runs reached each stage, in the order of a visit."""
+def _stages_without(experiment: Experiment) -> set[str]:
+    """Stages that visits of this study do not have."""
+    has = {
+        "forms_before": any(form.when == "before" for form in experiment.forms),
+        "calibration": experiment.display.calibrate != "off",
+        "practice": experiment.practice.trials > 0,
+        "forms_after": any(form.when == "after" for form in experiment.forms),
+    }
+    return {stage for stage, is_there in has.items() if not is_there}
+
+
+def funnel(kinds: Sequence[RunCount], lacking: Collection[str] = ()) -> list[FunnelStep]:
+    """How many runs reached each stage, in the order of a visit; without stages that the study lacks.
+
+    A stage at which a run is, of a version that had it, is listed all the same.
+    """
     reached = Counter[int]()
     for kind in kinds:
         reached[STAGES.index(stage_reached(kind))] += kind.runs
     return [
         FunnelStep(stage=stage, runs=sum(runs for far, runs in reached.items() if far >= position))
         for position, stage in enumerate(STAGES)
+        if stage not in lacking or reached[position]
     ]
 
 

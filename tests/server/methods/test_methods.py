@@ -78,7 +78,10 @@ def test_the_counts_are_those_of_the_runs(
         in answer["paragraph"]
     )
     assert "No participant has completed" not in answer["paragraph"]
-    assert "and one was not finished" in answer["paragraph"]
+    assert "and one was not finished or still under way" in answer["paragraph"]
+    study.change(status="closed")
+    closed = viewer.get("/studies/short/methods").json()["paragraph"]
+    assert "and one was not finished." in closed
     assert "declared before data collection: a failed attention check." in answer["paragraph"]
     with services.database.read() as session:  # as somebody who doubts a number would
         declared = [one for one in answer["numbers"] if one["source"].startswith("declaration: ")]

@@ -95,6 +95,8 @@ def test_every_run_is_counted_and_the_latest_are_listed(
     assert (shown["total"], shown["complete"], shown["active"]) == (3, 1, 2)
     reached = {step["stage"]: step["runs"] for step in shown["funnel"]}
     assert (reached["consent"], reached["done"]) == (3, 1)
+    assert "forms_before" in reached
+    assert "forms_after" not in reached  # the study has no questionnaire after the trials
 
 
 def test_a_finished_run_is_done_in_the_table_as_in_the_funnel(
