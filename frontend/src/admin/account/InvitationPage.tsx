@@ -52,6 +52,12 @@ const MAY: Record<Schemas["InvitationState"]["role"], string> = {
   viewer: "You will be a viewer: you can see studies and their data.",
 };
 
+/** Why somebody who chose this on the start page gets a form first. */
+const AFTER: Readonly<Record<string, string>> = {
+  "/studies/new": "Studies belong to an account of this server. Create yours; the next page takes your clips.",
+  "/analyze": "Tables are analyzed by this server, for people with an account. Create yours; the next page takes your table.",
+};
+
 function MakeAccount({ token, role }: { token: string; role: Schemas["InvitationState"]["role"] }) {
   const [name, setName] = useState("");
   const [password, setPassword] = useState("");
@@ -62,7 +68,8 @@ function MakeAccount({ token, role }: { token: string; role: Schemas["Invitation
   });
   return (
     <>
-      <EntryForm sending={accept} button="Create account">
+      <EntryForm sending={accept} button="Create account" busy="Creating your account. This takes a few seconds.">
+        {AFTER[next] !== undefined && <Text size="sm">{AFTER[next]}</Text>}
         <Text size="sm">{MAY[role]}</Text>
         <NameField label="User name" value={name} onChange={setName} />
         <PasswordField label="Password" fresh value={password} onChange={setPassword} />

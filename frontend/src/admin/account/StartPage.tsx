@@ -59,7 +59,7 @@ export function StartPage() {
         <Choice
           title="Analyze data"
           text={`${first}Drop a table of ratings that you already have: ANOVA, mixed models, pairs or opinion scores.`}
-          button="Choose a table"
+          button={invitation === null ? "Choose a table" : "Create account"}
           href={entrance(FROM_TABLE)}
         />
       </SimpleGrid>

@@ -25,11 +25,14 @@ export function EntryPage({ title, children }: { title: string; children: ReactN
 interface FormProps<T> {
   sending: UseMutationResult<T, Error, void>;
   button: string;
+  /** What is said from the click until the next page is there. */
+  busy?: string;
   children: ReactNode;
 }
 
 /** Fields, the server's refusal where there is one, and the button that sends. */
-export function EntryForm<T>({ sending, button, children }: FormProps<T>) {
+export function EntryForm<T>({ sending, button, busy, children }: FormProps<T>) {
+  const isBusy = sending.isPending || (busy !== undefined && sending.isSuccess);
   const submit = (event: SubmitEvent) => {
     event.preventDefault();
     sending.mutate();
@@ -39,9 +42,14 @@ export function EntryForm<T>({ sending, button, children }: FormProps<T>) {
       <Stack>
         {children}
         {sending.error !== null && <ErrorAlert error={sending.error} />}
-        <Button type="submit" loading={sending.isPending}>
+        <Button type="submit" loading={isBusy}>
           {button}
         </Button>
+        {busy !== undefined && (
+          <Text size="sm" role="status">
+            {isBusy && busy}
+          </Text>
+        )}
       </Stack>
     </Paper>
   );

@@ -146,7 +146,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
       <Group justify="space-between">
         <Text>
           {count(files.length)} {files.length === 1 ? "clip" : "clips"} received
-          {!received.has_manifest && `: ${summary(files.length - refused - changed, changed, refused)}`}.
+          {!received.has_manifest && refused + changed > 0 && `: ${summary(files.length - refused - changed, changed, refused)}`}.
         </Text>
         <Button size="compact-sm" variant="default" onClick={upload.forget}>
           Start over
@@ -215,7 +215,7 @@ function inOrder(files: Schemas["UploadedFile"][]): Schemas["UploadedFile"][] {
 
 function summary(shown: number, changed: number, refused: number): string {
   const parts = [
-    shown > 0 && `${count(shown)} unchanged`,
+    shown > 0 && `${count(shown)} as uploaded`,
     changed > 0 && `${count(changed)} converted`,
     refused > 0 && `${count(refused)} unusable`,
   ];
