@@ -167,14 +167,14 @@ class UnfilledText(NamedTuple):
     ----------
     path : str
         As the TOML has it, with the language: `texts.en.consent`.
-    place : str
+    where : str
         The same in the words of the pages: `the text "Consent"`.
     certain : bool
         False if the marks may be intended.
     """
 
     path: str
-    place: str
+    where: str
     language: str
     marks: tuple[str, ...]
     certain: bool
@@ -185,10 +185,10 @@ class UnfilledText(NamedTuple):
         rest = f" and {more} more" if more > 0 else ""
         one = len(self.marks) == 1
         if not self.certain:
-            of = f"{_capitalized(self.place)} (language {self.language})"
+            of = f"{_capitalized(self.where)} (language {self.language})"
             return f"{of} has {named}{rest}. Should this be filled in before participants read it?"
         return (
-            f"{_capitalized(self.place)} (language {self.language}) still has "
+            f"{_capitalized(self.where)} (language {self.language}) still has "
             f"{'a placeholder' if one else 'placeholders'} to fill in: {named}{rest}. Replace "
             f"{'it' if one else 'each'}, or put `backticks` around {'it' if one else 'one'} that "
             "participants should read unchanged."
@@ -204,11 +204,11 @@ def unfilled_texts(declared: Experiment) -> list[UnfilledText]:
         plain = _LINK.sub(" ", _CODE.sub(" ", text))
         if path.startswith("attention.text"):
             plain = plain.replace("{response}", " ")  # the page fills it in
-        place = place_in_words(declared, path)
+        where = place_in_words(declared, path)
         if certain := tuple(dict.fromkeys(_certain(plain))):
-            texts.append(UnfilledText(path, place, language, certain, certain=True))
+            texts.append(UnfilledText(path, where, language, certain, certain=True))
         elif doubtful := tuple(dict.fromkeys(_DOUBTFUL.findall(_RULE.sub(" ", plain)))):
-            texts.append(UnfilledText(path, place, language, doubtful, certain=False))
+            texts.append(UnfilledText(path, where, language, doubtful, certain=False))
     return sorted(texts, key=lambda text: not text.certain)
 
 

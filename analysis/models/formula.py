@@ -190,8 +190,8 @@ def _refuse_slopes_of_factors(formula: Formula, people: RandomPart, factors: Col
             if not set(factors).isdisjoint(effect):
                 name = ":".join(effect)
                 raise InputError(
-                    f"(0 + {name} | {part.grouping}) gives each level of a factor a separate variance, which "
-                    f"is not supported; write (0 + {name} || {part.grouping}) for one variance"
+                    f"(0 + {name} | {part.grouping}) gives each level of a factor a separate variance. "
+                    f"Write (0 + {name} || {part.grouping}) for one variance"
                 )
     if people.independent and any(len(e) > 1 or e[0] in factors for e in people.correlated):
         raise InputError(
@@ -221,8 +221,8 @@ class _Reader:
             grouping = self.grouping(of)
             if without_intercept and bar == "|" and len(effects) > 1:
                 raise InputError(
-                    f"'{self.whole}' has slopes by {grouping} that correlate with one another and not with "
-                    "the intercept (0 +), which is not supported; write || or remove 0 +"
+                    f"'{self.whole}' has slopes by {grouping} that correlate without the intercept (0 +), "
+                    "which is not supported; write || or remove 0 +"
                 )
             if not without_intercept:
                 intercepts.append(grouping)

@@ -155,7 +155,7 @@ def mixed_text(result: MixedResult) -> str:
 
 
 def _slopes_note(result: MixedResult | OrdinalResult) -> tuple[str, ...]:
-    """What || stands for in the formula, where it stands next to a factor."""
+    """What || means in the formula, where slopes of a factor have it."""
     slopes = {name for c in result.components if c.term != "intercept" for name in c.term.split(":")}
     of_factors = "||" in result.formula and not slopes.isdisjoint(result.factors)
     return (SLOPES_NOTE,) if of_factors else ()

@@ -76,7 +76,7 @@ def doctor(
 
 
 def _as_lines(finding: Finding) -> Text:
-    """The verdict, what was found, and what to do on lines of their own; names that are long stay whole."""
+    """The verdict, what was found, and what to do on further lines; names that are long stay whole."""
     indent = " " * 9
     wrapped = partial(wrap, width=min(WIDTH, out.width), break_long_words=False, break_on_hyphens=False)
     lines = wrapped(

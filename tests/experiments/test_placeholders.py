@@ -66,7 +66,7 @@ def test_marks_that_may_be_meant_as_they_are_do_not_block(mark: str) -> None:
 def test_questions_labels_and_titles_are_looked_at_too() -> None:
     text = SHORT.replace("How natural?", "How [adjective]?").replace("Glasses", "[Option]")
     text = text.replace('title = "A short study"', 'title = "[Title]"')
-    assert [(found.path, found.place) for found in unfilled_texts(parse_experiment(text))] == [
+    assert [(found.path, found.where) for found in unfilled_texts(parse_experiment(text))] == [
         ("title", '"Title"'),
         ("trial.scale.question.en", '"Question" of "Scale" of "Trial"'),
         (

@@ -233,11 +233,11 @@ def test_formulas_are_read_as_r_reads_them() -> None:
         ("rating ~ blur + (1 | clip) + (1 + blur | clip)", "has 2 intercepts by clip; write one"),
         (
             "rating ~ blur + (1 | participant) + (0 + blur | participant)",
-            "gives each level of a factor a separate variance, which is not supported; write (0 + blur ||",
+            "gives each level of a factor a separate variance. Write (0 + blur || participant)",
         ),
         (
             "rating ~ blur + age + (1 | clip) + (0 + blur + age | clip)",
-            "correlate with one another and not with the intercept (0 +), which is not supported",
+            "correlate without the intercept (0 +), which is not supported",
         ),
         (
             "rating ~ blur + age + (1 + blur | participant) + (0 + age || participant)",

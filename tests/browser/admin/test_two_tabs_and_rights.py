@@ -175,6 +175,28 @@ def looking(dashboard: Dashboard) -> Iterator[BrowserContext]:
     context.close()
 
 
+def test_the_start_page_says_why_an_account_comes_first_and_that_it_is_being_made(
+    dashboard: Dashboard,
+) -> None:
+    with migrated_services(dashboard.server.settings) as services:
+        _, token = invitations.invite(services.database, "owner", "", None)
+    browser = dashboard.page.context.browser
+    assert browser is not None
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-GB")
+    page = context.new_page()
+    page.goto(f"{dashboard.server.address}/admin/start#invitation={token}")
+    expect(page.get_by_role("link", name="Choose a table")).to_have_count(0)
+    page.get_by_role("link", name="Create account").last.click()
+    expect(page.get_by_text("the next page takes your table")).to_be_visible()
+    page.get_by_label("User name").fill("Theo")
+    page.locator("input[autocomplete=new-password]").fill(PASSWORD)
+    page.route("**/account", lambda route: page.wait_for_timeout(1_000) or route.continue_())
+    page.get_by_role("button", name="Create account").click(no_wait_after=True)
+    expect(page.get_by_text("Creating your account.")).to_be_visible()
+    page.get_by_role("heading", name="Analyze a table").wait_for()
+    context.close()
+
+
 FORBIDDEN = {
     "/studies/short/build": "This page needs the right “edit”",
     "/studies/short/links": "This page needs the right “run”",
