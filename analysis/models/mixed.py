@@ -176,13 +176,12 @@ def fit_mixed(
     if len(data.rating) <= x.shape[1] + parameters + 1:
         raise InputError(f"expected more than {x.shape[1] + parameters + 1} ratings, got {len(data.rating)}")
     # matrices this small only wait for a second thread
-    with threadpool_limits(1, "blas"):
+    # The search, and whatever is taken from its end, may divide by a residual of 0.
+    with threadpool_limits(1, "blas"), refused_where_exact(data, random_terms):
         # Standardized ratings: the search then has the same tolerance for any unit.
         units = units_of(data.rating)
         c = cross_products(x, units.scaled(data.rating), random_terms)
-        # The search may divide by a residual of 0.
-        with refused_where_exact(data, random_terms):
-            theta = fit_theta(c)
+        theta = fit_theta(c)
         fitted = _RemlFit(data, random_terms, c, theta, units)
         notes += unmodelled_slopes(data, slopes)
         result = _result(

@@ -432,7 +432,9 @@ class Criterion:
     @property
     def value(self) -> float:
         """-2 log (restricted) likelihood profiled over beta and sigma."""
-        return float(self.h + self.nu * (1 + np.log(2 * np.pi * self.r2 / self.nu)))
+        # Where nothing is left over, r2 is rounding of either sign: the search then ends at no number.
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return float(self.h + self.nu * (1 + np.log(2 * np.pi * self.r2 / self.nu)))
 
     @property
     def gradient(self) -> Floats:

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from scipy import optimize
 
+from analysis.models.columns import Slopes
 from analysis.models.fixed_effect_tests import _df_and_scale
 from analysis.models.mixed import fit_mixed
 from analysis.models.profile import _Path
@@ -202,6 +203,17 @@ def test_an_end_that_the_likelihood_lacks_is_said(monkeypatch) -> None:
     result = fit_mixed(few(), "who", "y", ["A"], slopes="none", intervals=True)
     assert np.isnan(result.components[-1].ci).all()
     assert "the profile interval of intercept, A[a0], who intercept, residual is open" in result.notes[-1]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("slopes", ["none", "all"])
+def test_people_who_all_differ_by_the_same_are_refused_in_one_line(slopes: Slopes) -> None:
+    """The search ends here, and the degrees of freedom would divide by a residual of 0."""
+    rows = pd.DataFrame(
+        [{"who": f"p{i}", "A": level, "y": i + step} for i in range(8) for step, level in enumerate("ab")]
+    )
+    with pytest.raises(InputError, match="no residual variance"):
+        fit_mixed(rows, "who", "y", ["A"], slopes=slopes)
 
 
 def test_ratings_without_residual_variance_are_refused_in_one_line() -> None:
