@@ -54,8 +54,8 @@ def rebuild(source: ReportSource, folder: Path, work: Path, progress: Progress =
 
 CHANGED = date(2026, 11, 28)
 """The day of the changes of 0.2.0's last week."""
-REWORDED = date(2026, 11, 29)
-"""The day on which sentences, captions and notes were rewritten in plain English."""
+REWORDED = date(2026, 11, 30)
+"""The last day on which sentences, captions and notes were rewritten in plain English."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ INTENDED = (
     IntendedChange(
         REWORDED,
         "Linear mixed model|Ordinal mixed model",
-        "formulas name a grouping by several columns with colons, and notes say what slopes are",
+        "formulas are written as --formula reads them, and notes say what slopes are",
     ),
     IntendedChange(
         REWORDED,
@@ -135,6 +135,7 @@ RENAMED = {
     "Evidence that answers are a person's": "Evidence that responses are from a person",
     "Ratings behind blinks": "Lag of ratings after blinks",
     "Yes or right": "Yes or correct",
+    "Ratings by condition": "Mean ratings by condition, with tests of each factor",
     "(turned)": "(reversed)",
 }
 """Headings, titles and short cells of older reports, and what they are called now."""

@@ -16,7 +16,7 @@ from analysis.capsule import (
 )
 
 OLD, NEW = date(2026, 11, 27), date(2026, 12, 24)
-BETWEEN = date(2026, 11, 29)
+BETWEEN = date(2026, 11, 30)
 WAS = {
     "effects": [{"f": 5.25}],
     "pairwise": [{"p": 0.01}, {"p": 0.02}],
@@ -87,7 +87,7 @@ def test_a_sentence_with_equal_numbers_is_named_as_new_wording(tmp_path: Path) -
     assert one.kind == "table"
     assert one.said == (
         "'Exclusions and decisions', line 3: '- nothing; every row counts' became '- none; every row was "
-        "analyzed', changed on purpose on 2026-11-29: the wording is in plainer English; all numbers are "
+        f"analyzed', changed on purpose on {REWORDED}: the wording is in plainer English; all numbers are "
         "equal"
     )
 
