@@ -129,7 +129,7 @@ def test_first_page_leads_to_the_demo_and_a_rating(started: str, chromium: Brows
 def test_first_account_is_created_and_a_study_can_be_made(started: str, chromium: Browser) -> None:
     page = chromium.new_page(viewport={"width": 1280, "height": 800}, locale="en-US")
     page.goto(started)
-    page.get_by_role("link", name="Create account").click()
+    page.get_by_role("link", name="Create account", exact=True).click()
     page.get_by_label("User name").fill("ada")
     page.locator("input[autocomplete=new-password]").fill("lantern-orbit-velvet-92")
     page.get_by_role("button", name="Create account").click()

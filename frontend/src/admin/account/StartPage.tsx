@@ -59,7 +59,7 @@ export function StartPage() {
         <Choice
           title="Analyze data"
           text={`${first}Drop a table of ratings that you already have: ANOVA, mixed models, pairs or opinion scores.`}
-          button={invitation === null ? "Choose a table" : "Create account"}
+          button={invitation === null ? "Choose a table" : "Create account and choose a table"}
           href={entrance(FROM_TABLE)}
         />
       </SimpleGrid>
