@@ -39,6 +39,18 @@ def decimals(errors: Iterable[float | None], otherwise: int = 3) -> int:
     return min(max(1 - math.floor(math.log10(min(known))), 0), 6)
 
 
+def mean_digits(errors: Iterable[float]) -> int:
+    """Decimals of means: two, or more where all their standard errors would be 0.00 (seconds, meters).
+
+    Examples
+    --------
+    >>> mean_digits([0.19, 0.004]), mean_digits([0.0036, 0.0042]), mean_digits([0.0, 0.0])
+    (2, 4, 2)
+    """
+    largest = max((error for error in errors if math.isfinite(error)), default=0.0)
+    return decimals([largest], 2) if largest < 0.01 else 2
+
+
 def share(value: float, digits: int = 3) -> str:
     """A number that cannot exceed 1, without its leading zero, as APA has it."""
     text = fixed(value, digits)

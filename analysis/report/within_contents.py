@@ -7,7 +7,7 @@ from analysis.plans.result import Analysis
 from analysis.report.contents import Contents, Part, Picture, Progress, Section
 from analysis.report.formats import Table
 from analysis.report.json_output import as_data, left_out
-from analysis.report.numbers import apa_p, fixed, share, share_interval
+from analysis.report.numbers import apa_p, fixed, mean_digits, share, share_interval
 from analysis.report.r_script import r_files, robust_files
 from analysis.report.within_tables import all_tables, corrected_df, has_sphericity, uses_multivariate
 from analysis.within.effects import Effect
@@ -91,16 +91,17 @@ def _share_explained(eta: float) -> str:
 def _direction(analysis: Analysis, effect: Effect, differs: bool) -> str:
     factor = effect.factors[0]
     means = sorted((m for m in analysis.means if m.effect == factor), key=lambda m: -m.mean)
+    digits = mean_digits(m.se for m in means)
     said = [
-        f"{analysis.labels.level(factor, m.levels[factor])} (M = {fixed(m.mean)}, SE = {fixed(m.se)})"
+        f"{analysis.labels.level(factor, m.levels[factor])} "
+        f"(M = {fixed(m.mean, digits)}, SE = {fixed(m.se, digits)})"
         for m in means
     ]
     if not differs:
         return f" Means: {', '.join(said)}."
     if len(said) == 2:
-        return (
-            f" Ratings were {fixed(means[0].mean - means[1].mean)} higher for {said[0]} than for {said[1]}."
-        )
+        by = fixed(means[0].mean - means[1].mean, digits)
+        return f" Ratings were {by} higher for {said[0]} than for {said[1]}."
     return f" From highest to lowest: {', '.join(said)}."
 
 
@@ -144,7 +145,10 @@ def _means(analysis: Analysis, effect: Effect) -> str:
     means = sorted((mean for mean in analysis.means if mean.effect == factor), key=lambda mean: -mean.mean)
     if len(means) > MAX_LEVELS:
         means = [means[0], means[-1]]
-    named = [f"{analysis.labels.level(factor, mean.levels[factor])} {fixed(mean.mean)}" for mean in means]
+    digits = mean_digits(mean.se for mean in means)
+    named = [
+        f"{analysis.labels.level(factor, mean.levels[factor])} {fixed(mean.mean, digits)}" for mean in means
+    ]
     return f". Means: {', '.join(named)}"
 
 

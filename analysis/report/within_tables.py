@@ -9,6 +9,7 @@ from analysis.report.numbers import (
     f_text,
     fixed,
     interval,
+    mean_digits,
     p_value,
     share,
     share_interval,
@@ -182,12 +183,13 @@ def _reasons(analysis: Analysis, which: str, skip: str = "\0") -> tuple[str, ...
 
 def means_table(analysis: Analysis) -> Table:
     """Estimated marginal means of one and two factors, and the cells."""
+    digits = mean_digits(m.se for m in analysis.means)
     rows = tuple(
         (
             f"{analysis.labels.effect(tuple(m.levels))}: {analysis.labels.cell(m.levels)}",
-            fixed(m.mean, 3),
-            fixed(m.se, 3),
-            interval(m.ci),
+            fixed(m.mean, max(digits, 3)),
+            fixed(m.se, max(digits, 3)),
+            interval(m.ci, digits),
         )
         for m in analysis.means
     )
@@ -198,11 +200,12 @@ def means_table(analysis: Analysis) -> Table:
 
 def pairs_table(analysis: Analysis) -> Table:
     """Paired comparisons of every margin of one factor (and of two where asked for)."""
+    digits = mean_digits(p.se for p in analysis.pairs)
     rows = tuple(
         (
             analysis.labels.pair(p.cell_a, p.cell_b),
-            fixed(p.difference),
-            interval(p.ci),
+            fixed(p.difference, digits),
+            interval(p.ci, digits),
             fixed(p.t),
             p_value(p.p),
             p_value(p.p_bonferroni),
@@ -241,16 +244,18 @@ def simple_effects_table(analysis: Analysis) -> Table:
 
 def contrasts_table(analysis: Analysis) -> Table:
     """Polynomial trends of factors whose levels are numbers, and planned contrasts."""
+    contrasts = (*analysis.trends, *analysis.contrasts)
+    digits = mean_digits(c.se for c in contrasts)
     rows = tuple(
         (
             f"{analysis.labels.factor(c.factor)}: {c.name}",
-            fixed(c.estimate),
-            interval(c.ci),
+            fixed(c.estimate, digits),
+            interval(c.ci, digits),
             fixed(c.t),
             str(c.df),
             p_value(c.p),
         )
-        for c in (*analysis.trends, *analysis.contrasts)
+        for c in contrasts
     )
     notes = (
         "Trends: orthonormal polynomials with the spacing of the levels. Planned contrasts: weights as "
@@ -343,12 +348,14 @@ def uses_multivariate(analysis: Analysis) -> bool:
 def _factor_rows(analysis: Analysis, factor: str, multivariate: bool, spread: bool) -> list[tuple[str, ...]]:
     test = test_cells(analysis.anova.effect(factor), multivariate)
     rows: list[tuple[str, ...]] = []
-    for mean in (m for m in analysis.means if m.effect == factor):
+    means = [m for m in analysis.means if m.effect == factor]
+    digits = mean_digits(m.se for m in means)
+    for mean in means:
         first = not rows
         name = analysis.labels.factor(factor) if first else ""
         label = analysis.labels.level(factor, mean.levels[factor])
-        sd = (fixed(mean.se * analysis.n_participants**0.5),) if spread else ()
-        numbers = (f"{fixed(mean.mean)} ({fixed(mean.se)})", *sd)
+        sd = (fixed(mean.se * analysis.n_participants**0.5, digits),) if spread else ()
+        numbers = (f"{fixed(mean.mean, digits)} ({fixed(mean.se, digits)})", *sd)
         rows.append((name, label, *numbers, *(test if first else ("", "", ""))))
     return rows
 

@@ -8,7 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.collections import PolyCollection
+from typer.testing import CliRunner
 
+from analysis.cli import app
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
 from analysis.plans.clip_rating import READING, analyse_study
@@ -266,3 +268,25 @@ def test_one_f_is_reported_first_everywhere(people: int) -> None:
         assert simple.p_value == (m.p_value if several else u.p_gg)
         q = u.df_effect
         assert row[2] == (f"{q}, {people - q}" if several else corrected_df(u))
+
+
+def test_means_in_seconds_are_printed_with_the_decimals_that_tell_them_apart(tmp_path) -> None:
+    """Of reaction times in seconds with an error of 4 ms two decimals would show 0.31 (0.00) throughout."""
+    path = tmp_path / "seconds.csv"
+    rows = [
+        f"{i},{level},{0.3 + 0.012 * (i % 4) + 0.003 * k + 0.001 * ((i * (k + 2)) % 3)}"
+        for i in range(12)
+        for k, level in enumerate("abc")
+    ]
+    path.write_text("\n".join(["id,c,y", *rows]))
+    call = ["anova", str(path), "--participant", "id", "--rating", "y", "--within", "c"]
+    told = CliRunner().invoke(app, [*call, "--out", str(tmp_path / "seconds")])
+    assert told.exit_code == 0, told.output
+    means = {
+        m["levels"]["c"]: m
+        for m in json.loads((tmp_path / "seconds/results.json").read_text())["marginal_means"]
+    }
+    report = (tmp_path / "seconds/report.md").read_text(encoding="utf-8")
+    for level, mean in means.items():
+        assert f"| {level} | {mean['mean']:.4f} ({mean['se']:.4f}) |" in report
+        assert f"{level} (M = {mean['mean']:.4f}, SE = {mean['se']:.4f})" in report
