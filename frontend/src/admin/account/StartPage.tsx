@@ -59,7 +59,8 @@ export function StartPage() {
         <Choice
           title="Analyze data"
           text={`${first}Drop a table of ratings that you already have: ANOVA, mixed models, pairs or opinion scores.`}
-          button={invitation === null ? "Choose a table" : "Create account and choose a table"}
+          button={invitation === null ? "Choose a table" : "Create account"}
+          label={invitation === null ? "Choose a table" : "Create account and choose a table"}
           href={entrance(FROM_TABLE)}
         />
       </SimpleGrid>
@@ -81,11 +82,13 @@ interface ChoiceProps {
   title: string;
   text: string;
   button: string;
+  /** The button's name where another one has the same words. */
+  label?: string;
   href: string;
   newTab?: boolean;
 }
 
-function Choice({ title, text, button, href, newTab = false }: ChoiceProps) {
+function Choice({ title, text, button, label = button, href, newTab = false }: ChoiceProps) {
   return (
     <Card withBorder padding="lg">
       <Stack h="100%" justify="space-between">
@@ -95,7 +98,7 @@ function Choice({ title, text, button, href, newTab = false }: ChoiceProps) {
           </Title>
           <Text size="sm">{text}</Text>
         </div>
-        <Button component="a" href={href} {...(newTab ? { target: "_blank", rel: "noreferrer" } : {})}>
+        <Button component="a" href={href} aria-label={label} {...(newTab ? { target: "_blank", rel: "noreferrer" } : {})}>
           {button}
         </Button>
       </Stack>
