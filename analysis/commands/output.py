@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 
 if TYPE_CHECKING:
     from analysis.report.contents import Contents, Picture
@@ -96,7 +96,7 @@ def show(contents: "Contents") -> None:
     """Print who was left out and the tables, at most 80 columns wide."""
     from analysis.report.formats import as_text, wrap
 
-    lines = [contents.title, f"{contents.n_participants} participants, from {contents.source}"]
+    lines = [contents.title, f"{counted(contents.n_participants, 'participant')}, from {contents.source}"]
     if contents.synthetic:
         lines.append(f"SYNTHETIC DATA: no person gave these {contents.given}")
     said = [*contents.left_out, *contents.decisions]

@@ -136,6 +136,7 @@ BEFORE_PEOPLE = "rm -r data && server study add exp3 --clips out/exp3 --open"
 CREATE = "server admin create --password long-enough-1"
 BEFORE: dict[str, Step] = {
     "analysis run exp3": "server simulate exp3 --participants 4",
+    "analysis run exp3 --csv exp3.csv --out again": "server export exp3 --out exp3.csv",
     "server database upgrade": "rm -r data",
     "server workspace member perception-lab ada --role owner": f"{CREATE} ada",
     "server workspace grant exp3 bob --rights view,export": f"{CREATE} bob",

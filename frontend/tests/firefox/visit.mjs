@@ -51,7 +51,7 @@ try {
   await rate("5");
   await see(".feedback");
   await press(".below .primary");
-  await page.waitForFunction(() => document.body.textContent.includes("That was the practice"));
+  await page.waitForFunction(() => document.body.textContent.includes("Practice is complete"));
   await press(".actions .primary");
   for (;;) {
     const screen = await see(".ready, .break, form, .code");

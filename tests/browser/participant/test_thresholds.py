@@ -99,7 +99,7 @@ def test_two_clips_in_turn(studies: Served, page: Page, tmp_path: Path) -> None:
     assert [row["response"] for row in rows] == ["first", "second", "second", "first"]
     assert all(bool(row["correct"]) == (row["response"] == row["interval"]) for row in rows)
     assert {row["verdict"] for row in rows} <= {"good", "uncertain", "flagged"}
-    assert "origin participant" in analysed(studies.server, "in_turn", tmp_path)
+    assert "\n1 participant, from palpebra.sqlite\n" in analysed(studies.server, "in_turn", tmp_path)
 
 
 @pytest.mark.parametrize(("study", "chosen"), [("yes_no", "yes"), ("in_turn", "first")])

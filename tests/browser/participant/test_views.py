@@ -155,7 +155,7 @@ def test_a_second_tab_answers_what_the_first_has_shown(
     page.wait_for_selector(".scale")
     second = context.new_page()
     Visit(second, studies.server.address).open(studies.studies["short_clips"].link_token)
-    second.click("text=Continue here")
+    second.get_by_role("button", name="Continue here").click()
     go_back(second)
     second.wait_for_selector(".scale")
     second.keyboard.press("3")

@@ -124,7 +124,7 @@ def test_practice_comes_once_more_where_a_key_was_pressed_during_the_clip(served
     page.keyboard.press("x")
     page.wait_for_selector(".scale")
     page.keyboard.press("5")
-    page.wait_for_selector("text=Please try this one once more")
+    page.wait_for_selector("text=Please try this one again")
     page.keyboard.press("Enter")
     visit.rate("5")
     page.wait_for_selector("text=Good, that is how it works")
