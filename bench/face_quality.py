@@ -38,7 +38,7 @@ from pathlib import Path
 
 import numpy as np
 from face_baking.assembly import STUDIO_EV
-from face_baking.bake import RECIPES
+from face_baking.bake import RECIPE
 from face_baking.development import (
     develop,
     error_and_noise,
@@ -127,9 +127,9 @@ def scene_of(character: Atlas, facekit: Path) -> FaceScene:
     """The scene in the character's provenance; a line if the recipe has changed since."""
     made = character.declaration.provenance
     framing = "face" if "--framing face" in made["command"] else "eyes"
-    if made["recipe"] != RECIPES[framing]:
+    if made["recipe"] != RECIPE:
         say(
-            f"{character.name} is of recipe {made['recipe']}, the references of {RECIPES[framing]}: "
+            f"{character.name} is of recipe {made['recipe']}, the references of {RECIPE}: "
             "they differ in what the recipes of docs/explanation/face-quality.md say"
         )
     identity = Identity.model_validate(made["face"])

@@ -31,7 +31,7 @@ from face_baking.renderer import Renderer, Setup, Shot, load_light
 from face_baking.scene import FaceScene
 
 # Raise when geometry, textures, materials, lights, lens or a framing change: work of others is not resumed.
-RECIPES = {"eyes": 35, "face": 36}
+RECIPE = 37
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 
@@ -77,7 +77,7 @@ class FaceOrder:
     def work_folder(self, kit: FaceKit) -> Path:
         """Folder of this face's shots: another face, size, quality, kit or recipe has another."""
         key = f"{self.identity.model_dump_json()} {self.framing} {self.size_px} {self.samples} {self.light}"
-        key += f" {load_light(self.light)} {kit.fingerprint} {RECIPES[self.framing]}"
+        key += f" {load_light(self.light)} {kit.fingerprint} {RECIPE}"
         digest = hashlib.sha256(key.encode())
         return self.work / f"face-{self.name}-{digest.hexdigest()[:10]}"
 
@@ -198,7 +198,7 @@ class FaceBake:
             f"--samples {order.samples.boxes} --frame-samples {order.samples.frame}{lids} "
             f"--light {order.light}{again}",
             "geometry": NOTICE,
-            "recipe": RECIPES[order.framing],
+            "recipe": RECIPE,
             "rendered_levels": len(rendered),
             "rendered_closures": rendered,
             "samples": order.samples.boxes,

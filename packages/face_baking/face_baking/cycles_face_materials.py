@@ -11,7 +11,7 @@ from cycles_face_wet import film, tear
 BASE = (0.86, 0.73, 0.595)
 SKIN_SHARE = "skin"
 """Pass that says which share of a pixel is skin."""
-SHADE = (0.75, 1.15, 1.4)
+SHADE = (0.85, 1.07, 1.2)
 """Exponents (red, green, blue) of the light that lids leave near their edges: it came by way of skin."""
 FLUSH = (0.95, 0.53, 0.51)
 """Share of light (red, green, blue) that the eye's white keeps at its nasal end, which turns to flesh."""

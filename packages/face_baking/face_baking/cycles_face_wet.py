@@ -9,9 +9,9 @@ from mathutils import Vector
 FILM_IOR = 1.376
 ROOM_MIRRORED = 0.5
 """Share of the room's light that the eyes mirror: half of what lies about them is the face itself."""
-ROUNDED = 5.0
+ROUNDED = 2.8
 """Exponent of a lamp's outline as the eyes mirror it: 2 is an ellipse, and beyond 8 a square."""
-BAR = (0.80, 0.94)
+BAR = (0.70, 0.95)
 """Where in a window's pane its bar begins and is whole, from the pane's middle (0) to its edge (1)."""
 FLOOR, CEILING = 0.25, 1.7
 """Light of the mirrored room's floor and ceiling over its mean."""
@@ -70,8 +70,10 @@ def reflected(n: Nodes, normal: Any, lights: dict[str, Any], room: float = ROOM_
 def _lamp_share(n: Nodes, start: Any, away: Any, lamp: dict[str, Any]) -> Any:
     """1 where a ray meets the lamp, rounded within its rectangle, 0 outside it, with a soft box's edge."""
     centre = Vector(lamp["place"])
-    turned = (Vector(lamp["aim"]) - centre).to_track_quat("-Z", "Y")
-    across, up, back = (turned @ Vector(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
+    back = (centre - Vector(lamp["aim"])).normalized()
+    # Upright, as windows are.
+    across = Vector((0, 1, 0)).cross(back).normalized()
+    up = back.cross(across)
     towards = n.vector("SUBTRACT", list(centre), start)
     facing = n.vector("DOT_PRODUCT", away, list(back))
     way = n.math("DIVIDE", n.vector("DOT_PRODUCT", towards, list(back)), facing)
@@ -88,7 +90,7 @@ def _lamp_share(n: Nodes, start: Any, away: Any, lamp: dict[str, Any]) -> Any:
             share = n.math("MULTIPLY", share, n.ramp(edge, *BAR, 1.0, 0.35))
     edge = n.math("POWER", n.math("ADD", *beside), 1 / ROUNDED)
     hot = n.ramp(edge, 0.0, 1.0, HOT, 1.0)
-    return n.math("MULTIPLY", n.math("MULTIPLY", share, hot), n.ramp(edge, 0.65, 1.10, 1.0, 0.0))
+    return n.math("MULTIPLY", n.math("MULTIPLY", share, hot), n.ramp(edge, 0.50, 1.15, 1.0, 0.0))
 
 
 def tear(lights: dict[str, Any]) -> Any:

@@ -67,8 +67,14 @@ class White:
     redness: float = 1.0
 
 
-DARK_WHITE = White(0.74, 1.25)
-"""With dark skin, which a camera gives more light, a white of the usual lightness shone by itself."""
+def white_of(melanin: float) -> White:
+    """The white that looks right next to skin of an optical depth of melanin.
+
+    One lightness for all was gray next to light skin, and shone by itself in dark skin, to which a camera
+    gives more light.
+    """
+    lightness = float(np.interp(melanin, [0.17, 0.25, 0.52, 1.0], [1.55, 1.3, 0.85, 0.55]))
+    return White(lightness, 1.25 if melanin > 0.9 else 1.0)
 
 
 def eye_maps(

@@ -17,9 +17,12 @@ from stimuli_builder.characters.colour import smooth
 TEXTURE_LIMIT = 1.25
 """Radians from the gaze axis at the edge of the eye's texture."""
 _SHADE_REACH_CM = (0.42, 0.16)
-_SHADE_DEPTH = (0.62, 0.40)
-_TURNED_AWAY, _TURNED_DEPTH = (0.55, 1.25), 0.32
+_SHADE_DEPTH = (0.54, 0.40)
+_TURNED_AWAY, _TURNED_DEPTH = (0.55, 1.25), 0.12
 """Radians from the gaze axis between which the white loses that share of its light to brow and nose."""
+_KEY_LIGHT, _EVENED = np.array([-0.5, 0.46, 0.74]), 0.4
+"""Direction of the studio's key light, and how far the white evens out its shading: light wanders for
+millimeters below it, and without that its far side was gray."""
 CARUNCLE_LIGHT = (0.85, 1.7)
 """Lightness of the corner's flesh over the white's, with dark and with light skin: there the darker one
 looked burned."""
@@ -30,7 +33,7 @@ _FLESH_CM, _FLESH_HIGH_CM = (0.20, 0.19), 0.065
 """Way of the caruncle's middle from the corner's tip, its half length, and its height over the floor."""
 _PLICA_CM, _PLICA_WIDE_CM, _PLICA_HIGH_CM = 0.45, 0.07, 0.022
 """Way of the plica's crest from the corner's tip, its half width, and its height over the floor."""
-_FLOOR_SOFT_CM, _FLOOR_UNDER_CM = 0.04, 0.06
+_FLOOR_SOFT_CM, _FLOOR_UNDER_CM = 0.04, 0.12
 """How softly the floor runs into the globe, and how far it reaches under either lid."""
 _FLUSHED_CM = (0.30, 0.66)
 """Distances from the nasal corner between which the eye's white turns from the corner's pink to its own."""
@@ -64,19 +67,36 @@ def eyeball(path: BlinkPath, posed: Array, side: int, stroke: float) -> Mesh:
     # Between lids that meet, shadows that are rendered leave little: this one would make the slit black.
     shade = turned * (1 - (1 - _lid_shade(path, posed, side, mesh.vertices)) * (1 - 0.35 * stroke))
     shade, flush = _nasal_end(path, side, mesh.vertices, sclera, shade)
+    shade = shade * (1 + sclera * (_evened(path, side, mesh.vertices) - 1))
     return Mesh(mesh.vertices, mesh.quads, uv, {"sclera": sclera, "shade": shade, "flush": flush})
+
+
+def _evened(path: BlinkPath, side: int, vertices: Array) -> Array:
+    """(n,) light over what the key light alone leaves on the white, most on its far side next to the nose."""
+    outward = vertices - path.globes[side].centre
+    lit = np.clip(outward @ _KEY_LIGHT / np.linalg.norm(outward, axis=1), 0.2, 1)
+    return np.asarray((0.8 / lit) ** (_EVENED + 0.2 * _nasal_share(path, side, vertices)))
 
 
 def _nasal_end(
     path: BlinkPath, side: int, vertices: Array, sclera: Array, shade: Array
 ) -> tuple[Array, Array]:
     """(n,) shade and flush of the white near the nose."""
-    away = (vertices - nasal_tip(path, path.rest, side, EDGE_LOOP))[:, :2]
-    from_corner = np.hypot(away[:, 0], 0.6 * away[:, 1])
-    nasal = smooth(_PLICA_CM + 0.65, _PLICA_CM, from_corner) * sclera
+    nasal = _nasal_share(path, side, vertices) * sclera
     # Both lids are near there, and what is rendered of their shadow is enough.
     shade = 1 - (1 - shade) * (1 - 0.8 * nasal)
-    return shade, smooth(_FLUSHED_CM[1], _FLUSHED_CM[0], from_corner) * sclera
+    return shade, smooth(_FLUSHED_CM[1], _FLUSHED_CM[0], _from_corner(path, side, vertices)) * sclera
+
+
+def _from_corner(path: BlinkPath, side: int, vertices: Array) -> Array:
+    """(n,) distances from the nasal corner's tip in cm; heights count less."""
+    away = (vertices - nasal_tip(path, path.rest, side, EDGE_LOOP))[:, :2]
+    return np.hypot(away[:, 0], 0.6 * away[:, 1])
+
+
+def _nasal_share(path: BlinkPath, side: int, vertices: Array) -> Array:
+    """(n,) 1 from the plica to the nose, 0 from 6.5 mm before it on."""
+    return smooth(_PLICA_CM + 0.65, _PLICA_CM, _from_corner(path, side, vertices))
 
 
 def corner_floor(
@@ -109,6 +129,9 @@ def corner_floor(
     shade = shade * (1 - (1 - _lid_shade(path, posed, side, vertices)) * (1 - 0.35 * stroke))
     if nasal:
         shade, flush = _nasal_end(path, side, vertices, whole, shade)
+        # As the globe where it meets it: elsewhere the floor faces the light.
+        meets = smooth(0.04, -0.04, height).ravel()
+        shade = shade * (1 + meets * (_evened(path, side, vertices) - 1))
         dark, light = CARUNCLE_LIGHT
         lightness = dark + (light - dark) * float(smooth(0.9, 0.3, np.asarray(melanin)))
         share = (smooth(_PLICA_CM + 0.16, _PLICA_CM - 0.14, way) * np.ones_like(height)).ravel()

@@ -17,11 +17,11 @@ from stimuli_builder.characters.colour import smooth
 LASH_POINTS, BROW_POINTS = 12, 8
 CLUMPS = {True: [0.14, 0.28, 0.32, 0.26], False: [0.60, 0.28, 0.09, 0.03]}
 """Shares of clumps of one to four lashes of upper and lower lids: lower ones in even bundles look planted."""
-FANNED_UNTIL, RAISED_DEGREES = 0.62, 10.0
-"""Stroke until which the upper lashes point where the open eye's point, and how far they rise on the way.
+FANNED_UNTIL, DOWN_AT, CLUMPS_APART, RAISED_DEGREES = 0.46, 0.78, 0.16, 10.0
+"""Strokes between which upper lashes go down, how far clumps are apart in it, and how far they rise before.
 
-In recordings they stay fanned before the lid until it is six tenths shut, and only then go down.
-Turned with their lid from the start, they lay before the eye like a comb at closure 0.12.
+In recordings they stay fanned until the lid is half shut, and then hang before the eye. Turned with their lid
+from the start, they lay before it like a comb at closure 0.12; all at once and later, as one dark line.
 """
 TEMPLE = (0.80, 1.05)
 """Where along the upper lid its lashes become sparse, and where there would be none.
@@ -105,9 +105,10 @@ class Lashes:
     def _held_back(self, root: Array, low: Index, share: Array, stroke: float) -> Array:
         """Radians by which each lash points higher than its lid has turned it, below 0."""
         opened, shut = (end[low] + share * (end[low + 1] - end[low]) for end in self._ends)
+        later = CLUMPS_APART * (np.modf(0.618 * self.row.leader)[0] - 0.5)
         here = spherical(root - self.path.globes[self.side].centre)[2]
-        followed = opened + (shut - opened) * smooth(FANNED_UNTIL - 0.15, 1.0, stroke)
-        raised = np.radians(RAISED_DEGREES) * np.sin(np.pi * np.clip(stroke / FANNED_UNTIL / 1.6, 0, 1)) ** 2
+        followed = opened + (shut - opened) * smooth(FANNED_UNTIL + later, DOWN_AT + later, stroke)
+        raised = np.radians(RAISED_DEGREES) * np.sin(np.pi * np.clip(stroke / 0.992, 0, 1)) ** 2
         return np.asarray(here - followed - raised)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from face_baking.blink_path import BlinkPath
-from face_baking.eye_texture import DARK_WHITE, White, eye_maps
+from face_baking.eye_texture import eye_maps, white_of
 from face_baking.eyes import Mesh, corner_floor, eyeball, tear_line, wet_film
 from face_baking.framing import FRAMINGS, Box, Framing, View
 from face_baking.hair import Brow, Lashes, Strands
@@ -156,9 +156,8 @@ class FaceScene:
 
     def write_textures(self, file: Path) -> None:
         """Write the eye's maps: `colour` linear albedo, `height` in 0-1; lowest row first."""
-        dark = self.identity.skin.melanin > 0.9
         size = round(TEXTURE_SHARE * self.view.size_px[0])
-        white = DARK_WHITE if dark else White()
+        white = white_of(self.identity.skin.melanin)
         colour, height = eye_maps(self.identity.iris, self.identity.seed + 3, white, size)
         np.savez(file, colour=colour, height=height)
 

@@ -111,9 +111,20 @@ def test_the_white_is_darkest_at_the_lids(path: BlinkPath) -> None:
     middle = (np.abs(mesh.vertices[:, 0] - centre[0]) < 0.1) & (mesh.vertices[:, 2] > centre[2])
     height, shade = (mesh.vertices - centre)[middle, 1], mesh.values["shade"][middle]
     order = np.argsort(height)
-    lowest, highest = shade[order][[0, -1]]
-    assert shade.max() > 0.8
-    assert max(lowest, highest) < 0.7
+    edges = [edge_line(path, path.rest, 1, EDGE_LOOP, upper) - centre for upper in (True, False)]
+    at_the_lids = [line[np.abs(line[:, 0]).argmin(), 1] for line in edges]
+    assert shade[np.abs(height) < 0.3].max() > 0.75
+    assert np.interp(at_the_lids, height[order], shade[order]).max() < 0.65
+
+
+def test_the_white_is_lit_more_evenly_than_the_key_light_lights_it(path: BlinkPath) -> None:
+    """Next to the nose the right eye's white turns away from the key light, and the left eye's to it."""
+    values = []
+    for side in (-1, 1):
+        mesh, outward = eye(path, side), np.array([-side, 0.0, 1.0]) / np.sqrt(2)
+        way = (mesh.vertices - path.globes[side].centre) @ outward
+        values.append(mesh.values["shade"][way.argmax()])
+    assert values[0] > 1.3 * values[1]
 
 
 def test_the_pink_stays_at_the_nose_as_the_eye_turns(kit: FaceKit) -> None:

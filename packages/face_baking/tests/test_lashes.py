@@ -37,6 +37,13 @@ def test_lashes_stay_fanned_until_the_lid_is_half_shut(path: BlinkPath, stroke: 
     assert np.median(np.linalg.norm(moved, axis=1)) > 0.9 * np.median(np.linalg.norm(opened, axis=1))
 
 
+def test_lashes_hang_before_an_eye_that_is_nearly_shut(path: BlinkPath) -> None:
+    """On their way down all at once, they pointed at the camera as one dark line until closure 0.95."""
+    assert np.mean(seen(path, 0.85)[:, 1] < 0) > 0.9
+    halfway = np.mean(seen(path, 0.65)[:, 1] < 0)
+    assert 0.1 < halfway < 0.9
+
+
 def test_more_of_the_lower_lashes_stand_alone(path: BlinkPath) -> None:
     """In even bundles, as upper ones are, they looked planted; counted by lashes, not by bundles."""
     alone = {}

@@ -15,7 +15,7 @@ from PIL import Image
 from experiments.errors import InputError
 from experiments.files import says_full
 from face_baking.assembly import STUDIO_EV
-from face_baking.bake import NOTICE, RECIPES
+from face_baking.bake import NOTICE, RECIPE
 from face_baking.development import develop, to_8_bit
 from face_baking.environment import ensure_blender
 from face_baking.identity import identity_of_seed
@@ -48,7 +48,7 @@ class SamplesOrder:
             "size_px": list(self.size_px),
             "samples": self.samples,
             "kit": kit.fingerprint,
-            "recipe": RECIPES["eyes"],
+            "recipe": RECIPE,
         }
 
 
