@@ -304,10 +304,10 @@ def compare_blends() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="alder@8, birch@6, cedar@4 and hazel@5")
+    parser.add_argument("names", nargs="*", metavar="NAME", help="alder@8, birch@6 and cedar@4")
     parser.add_argument("--facekit", type=Path, help="your copy of ICT-FaceKit")
     asked = parser.parse_args()
-    for name in asked.names or ("alder@8", "birch@6", "cedar@4", "hazel@5"):
+    for name in asked.names or ("alder@8", "birch@6", "cedar@4"):
         atlas = load_atlas(SHIPPED / name)
         scene = scene_of_atlas(atlas, asked.facekit) if asked.facekit else None
         at, crop = poses(atlas), atlas.declaration.lower_lid.crop

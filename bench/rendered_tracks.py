@@ -71,7 +71,7 @@ LOOKS = (
     Look("alder@8", True, (640, 480), CLOSE_UP_PX, 3, 0.7, 20, 15),
     Look("birch@6", True, (640, 480), CLOSE_UP_PX, 3, 0.7, 26, 16),
     Look("cedar@4", True, (640, 480), CLOSE_UP_PX, 5, 1.0, 20, 17),
-    Look("hazel@5", True, (640, 480), CLOSE_UP_PX, 5, 0.7, 26, 18),
+    Look("hazel@6", True, (640, 480), CLOSE_UP_PX, 5, 0.7, 26, 18),
 )
 
 

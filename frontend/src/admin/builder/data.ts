@@ -184,7 +184,7 @@ const KNOWN: Record<string, string[]> = {
     "birch@7",
     "cedar@4",
     "cedar@5",
-    "hazel@5",
+    "hazel@6",
     "cartoon",
     "cartoon@2",
     "cartoon-willow",
