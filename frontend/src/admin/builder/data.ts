@@ -181,7 +181,7 @@ const KNOWN: Record<string, string[]> = {
     "alder@8",
     "alder@9",
     "birch@6",
-    "birch@7",
+    "birch@8",
     "cedar@4",
     "cedar@5",
     "hazel@6",
