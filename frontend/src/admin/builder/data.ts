@@ -179,7 +179,7 @@ const KNOWN: Record<string, string[]> = {
   languages: ["en", "de"],
   "render.character": [
     "alder@8",
-    "alder@9",
+    "alder@10",
     "birch@6",
     "birch@8",
     "cedar@4",
