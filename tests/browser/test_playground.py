@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from addon_build.playground import build_scripts, playground_page, vrm_page
-from playwright.sync_api import BrowserContext
+from playwright.sync_api import BrowserContext, Page
 
 from blink_engine import BlinkEngine
 from stimuli_builder.clips.preview import write_strips
@@ -15,6 +15,20 @@ DARK = """() => [...document.querySelectorAll('FACES')].map((canvas) => {
     const all = canvas.getContext('2d').getImageData(0, 0, width, height).data;
     return all.reduce((sum, value) => sum + value, 0) / all.length;
   })""".replace("FACES", FACES)
+
+
+SLOW_MS = 180_000
+"""Without a graphics card, an avatar's frame takes seconds beside other tests."""
+
+
+@pytest.fixture
+def avatar(context: BrowserContext, pages: Path) -> Page:
+    """The page of the avatar, once it blinks."""
+    opened = context.new_page()
+    opened.set_default_timeout(SLOW_MS)
+    opened.goto((pages / "vrm.html").as_uri())
+    opened.wait_for_selector("#said:not(:empty)")
+    return opened
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +77,10 @@ def test_a_saved_curve_is_a_file_that_others_read(
     assert len(lines) == 3601
 
 
-def test_an_avatar_is_given_the_engines_lids(context: BrowserContext, pages: Path) -> None:
-    opened = context.new_page()
-    opened.goto((pages / "vrm.html").as_uri())
-    opened.wait_for_selector("#said:not(:empty)")
-    assert opened.inner_text("#said").startswith("Blinking as a listener")
+def test_an_avatar_is_given_the_engines_lids(avatar: Page) -> None:
+    assert avatar.inner_text("#said").startswith("Blinking as a listener")
     # As many moments as it takes to see ten within a blink: read together, as the page set them together.
-    opened.evaluate("""() => {
+    avatar.evaluate("""() => {
       const canvas = document.querySelector('canvas');
       window.seen = [];
       new MutationObserver(() => {
@@ -77,37 +88,31 @@ def test_an_avatar_is_given_the_engines_lids(context: BrowserContext, pages: Pat
         window.seen.push([time, lidLeft, lidRight].map(Number));
       }).observe(canvas, { attributes: true, attributeFilter: ['data-lid-right'] });
     }""")
-    opened.wait_for_function("window.seen.filter(([, left]) => left > 0.02).length >= 10", timeout=60_000)
+    avatar.wait_for_function("window.seen.filter(([, left]) => left > 0.02).length >= 10")
     engine = BlinkEngine(seed=1, state="listening")
-    for time_s, left, right in opened.evaluate("window.seen"):
+    for time_s, left, right in avatar.evaluate("window.seen"):
         frame = engine.frame(time_s)
         assert (left, right) == pytest.approx((frame.left, frame.right), abs=1e-4)
 
 
-def test_an_avatar_moves_between_blinks(context: BrowserContext, pages: Path) -> None:
-    opened = context.new_page()
-    opened.goto((pages / "vrm.html").as_uri())
-    opened.wait_for_selector("#said:not(:empty)")
+def test_an_avatar_moves_between_blinks(avatar: Page) -> None:
     open_eyes = "Number(document.querySelector('canvas').dataset.lidLeft) === 0"
     pictures = []
     while len(pictures) < 3:
-        opened.wait_for_function(open_eyes)
-        picture = opened.locator("canvas").screenshot()
+        avatar.wait_for_function(open_eyes)
+        picture = avatar.locator("canvas").screenshot()
         # A blink may have begun meanwhile.
-        if opened.evaluate(open_eyes):
+        if avatar.evaluate(open_eyes):
             pictures.append(picture)
     assert len(set(pictures)) == 3
 
 
 def test_a_file_that_is_not_an_avatar_is_refused_and_the_one_that_is_there_blinks_on(
-    context: BrowserContext, pages: Path, tmp_path: Path
+    avatar: Page, tmp_path: Path
 ) -> None:
     wrong = tmp_path / "notes.vrm"
     wrong.write_text("no model")
-    opened = context.new_page()
-    opened.goto((pages / "vrm.html").as_uri())
-    opened.wait_for_selector("#said:not(:empty)")
-    opened.get_by_label("Your avatar").set_input_files(wrong)
-    opened.wait_for_selector("text=This model cannot be used")
-    before = opened.evaluate("document.querySelector('canvas').dataset.time")
-    opened.wait_for_function(f"Number(document.querySelector('canvas').dataset.time) > {before}")
+    avatar.get_by_label("Your avatar").set_input_files(wrong)
+    avatar.wait_for_selector("text=This model cannot be used")
+    before = avatar.evaluate("document.querySelector('canvas').dataset.time")
+    avatar.wait_for_function(f"Number(document.querySelector('canvas').dataset.time) > {before}")

@@ -202,11 +202,11 @@ export function countTicks(largest: number): number[] {
   return Array.from({ length: Math.floor(largest / step) + 1 }, (_, index) => index * step);
 }
 
-/** A histogram of bins `step` wide that start at `from`. */
-function histogram(bins: { from: number; count: number }[], step: number, label: string, counted: string): Plot.PlotOptions {
+/** A histogram of bins `step` wide that start at `from`; `note` follows N in its caption. */
+function histogram(bins: { from: number; count: number }[], step: number, label: string, counted: string, note = ""): Plot.PlotOptions {
   return {
     height: 210,
-    caption: `N = ${String(bins.reduce((sum, { count }) => sum + count, 0))} ${counted}.`,
+    caption: `N = ${String(bins.reduce((sum, { count }) => sum + count, 0))} ${counted}.${note}`,
     x: { label, domain: [0, Math.max(step, ...bins.map(({ from }) => from + step))] },
     y: { label: counted, grid: true, ticks: countTicks(Math.max(1, ...bins.map(({ count }) => count))), tickFormat: "d" },
     marks: [
@@ -228,7 +228,7 @@ export function timePlot({ response_times }: AnyResults): Plot.PlotOptions {
 
 export function delayPlot({ playback }: AnyResults): Plot.PlotOptions {
   const bins = playback.key_to_first_frame_ms.map((count, bin) => ({ from: 10 * bin, count }));
-  return histogram(bins, 10, "time from key to first frame (ms; last bar: 100 and more)", "plays");
+  return histogram(bins, 10, "time from key to first frame (ms)", "plays", " The last bar holds all of 100 ms and more.");
 }
 
 // The numbers of each figure of the results, as they are saved: labels where the figures have labels.

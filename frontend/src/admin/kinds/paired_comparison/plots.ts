@@ -57,10 +57,12 @@ export function levelPlot(name: string, { levels }: Data, factors: Factors): Plo
   const comparisons = [...new Set([Math.min(...counts), Math.max(...counts)])].join(" to ");
   return {
     height: 230,
-    caption: `N = ${comparisons} comparisons per level, ties as half. Dashed: no preference. The report has the intervals.`,
+    caption: `Share of comparisons with another level in which it was chosen, N = ${comparisons} per level, ties as half. Dashed: no preference. The report has the intervals.`,
     marginBottom: 68,
+    // Room for "100%" beside the title of the axis.
+    marginLeft: 48,
     x: { domain: labels.all, label: null },
-    y: { domain: [0, 1], tickFormat: ".0%", grid: true, label: "chosen over other levels" },
+    y: { domain: [0, 1], tickFormat: ".0%", grid: true, label: "share chosen" },
     marks: [
       Plot.axisX({ lineWidth: 24 / Math.max(3, labels.all.length), label: labels.title, labelAnchor: "center", labelArrow: "none" }),
       Plot.ruleY([0.5], { strokeDasharray: "4 3", strokeOpacity: 0.6 }),
