@@ -31,6 +31,7 @@ OPENING_MM = {
     "alder@6": 10.07,
     "alder@7": 10.07,
     "hazel@4": 10.91,
+    "cedar@5": 9.45,
     "alder@9": 9.21,
     "birch@7": 9.35,
     "hazel@5": 10.91,

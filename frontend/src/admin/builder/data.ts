@@ -183,7 +183,7 @@ const KNOWN: Record<string, string[]> = {
     "birch@6",
     "birch@8",
     "cedar@4",
-    "cedar@5",
+    "cedar@6",
     "hazel@6",
     "cartoon",
     "cartoon@2",
