@@ -18,7 +18,7 @@ DARK = """() => [...document.querySelectorAll('FACES')].map((canvas) => {
 
 
 SLOW_MS = 180_000
-"""Without a graphics card, an avatar's frame takes seconds beside other tests."""
+"""Without a graphics card, an avatar's frame takes seconds while other tests run."""
 
 
 @pytest.fixture

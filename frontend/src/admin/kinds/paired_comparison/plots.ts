@@ -59,7 +59,7 @@ export function levelPlot(name: string, { levels }: Data, factors: Factors): Plo
     height: 230,
     caption: `Share of comparisons with another level in which it was chosen, N = ${comparisons} per level, ties as half. Dashed: no preference. The report has the intervals.`,
     marginBottom: 68,
-    // Room for "100%" beside the title of the axis.
+    // Room for "100%" next to the title of the axis.
     marginLeft: 48,
     x: { domain: labels.all, label: null },
     y: { domain: [0, 1], tickFormat: ".0%", grid: true, label: "share chosen" },
