@@ -1,6 +1,7 @@
 """One format for rejecting bad input: what was expected, what was received, and what to do."""
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -100,7 +101,10 @@ def expectation(detail: Mapping[str, Any]) -> str | None:
     >>> expectation({"type": "greater_than_equal", "ctx": {"ge": 1}})
     '1 or more'
     """
-    kind = detail["type"]
+    kind, given = detail["type"], detail.get("input")
+    # nan is neither above nor below a limit.
+    if isinstance(given, float) and math.isnan(given):
+        return "a number"
     return LIMITS[kind](detail["ctx"]) if kind in LIMITS else TYPES.get(kind)
 
 

@@ -152,6 +152,8 @@ def test_a_clip_of_a_file_with_decimal_commas(
         (("--size", "big"), "expected WIDTHxHEIGHT"),
         (("--size", "4000x360"), "--size (width): expected at most"),
         (("--duration", -4), "error: --duration: expected 3 or more, got -4"),
+        (("--duration", "nan"), "error: --duration: expected a number, got nan"),
+        (("--duration-ms", "nan"), "error: --duration-ms: expected a number, got nan"),
         (("--lower-lid", "both"), "has no lower-lid layer"),
         (("--clip-frames", 12), "longer than the clip of 12 frames"),
         (("--duration", 9, "--duration-ms", 300), "error: expected --duration or --duration-ms, got both"),
