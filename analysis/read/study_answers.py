@@ -58,7 +58,7 @@ def load_csv(path: Path, experiment: Experiment, reading: Reading, study: str | 
     for name in RUN_FLAGS:
         if name in rows.columns:
             rows[name] = flags(rows[name], path.name)
-    seen = _first_seen(rows)
+    seen = _first_seen(rows, path.name)
     rows = rows.drop(columns="saved_at", errors="ignore")
     rows, chosen = _of_one_study(rows, experiment.name, study, path.name)
     return StudyAnswers(rows, path.name, (*table.decisions, *chosen), seen)
@@ -116,11 +116,19 @@ def _has_no_rows(path: Path) -> bool:
         return bool(file.readline().strip()) and not file.read(64).strip()
 
 
-def _first_seen(rows: pd.DataFrame) -> dict[str, str]:
+def _first_seen(rows: pd.DataFrame, source: str) -> dict[str, str]:
     if not {"run", "saved_at"} <= set(rows.columns) or not _runs_again(rows):
         return {}
-    first = rows[["run", "saved_at"]].astype(str).groupby("run", observed=True)["saved_at"].min()
-    return {str(run): str(moment) for run, moment in first.items()}
+    words = rows["saved_at"].astype(str)
+    words = words[~words.isin(MISSING_MARKS)]
+    times = pd.to_datetime(words, format="ISO8601", utc=True, errors="coerce")
+    if times.isna().any():
+        raise InputError(
+            f"{source}: 'saved_at' is '{words[times.isna()].iloc[0]}' in a row; expected a time such as "
+            "2026-11-30T09:05:00Z, year first. It decides which run of a participant is the first"
+        )
+    first = times.groupby(rows["run"].astype(str)).min()
+    return {str(run): moment.isoformat() for run, moment in first.items()}
 
 
 def _runs_again(rows: pd.DataFrame) -> bool:

@@ -156,6 +156,32 @@ def test_exclusion_by_hand_and_later_runs_are_named(tmp_path, rows) -> None:
 
 
 @pytest.mark.parametrize(
+    ("second", "first"),
+    [
+        ("2026-01-02T00:00:00Z", "2026-01-01T00:00:00Z"),
+        ("2026-01-01 23:30:00-05:00", "2026-01-02 01:00:00+01:00"),
+        ("2026-01-01T00:00:00.5Z", "2026-01-01T00:00:00Z"),
+    ],
+)
+def test_the_first_of_two_runs_is_found_by_time_and_not_by_text(tmp_path, rows, second, first) -> None:
+    rows = change(rows, lambda row: row["run"] == "run5", participant="P02", saved_at=second)
+    rows = change(rows, lambda row: row["run"] == "run2", saved_at=first)
+    analysis = analyse(tmp_path, rows, with_rules())
+    assert [run.run for run in analysis.exclusions.runs] == ["run5"]
+
+
+def test_times_that_begin_with_the_day_do_not_decide_which_run_is_the_first(tmp_path, rows) -> None:
+    """As text 02.12. is before 30.11.; whether 02/12 is in December or February cannot be seen."""
+    rows = change(rows, lambda row: True, saved_at="02.12.2026 10:00")
+    assert not analyse(tmp_path, rows, with_rules()).exclusions.runs
+    rows = change(rows, lambda row: row["run"] == "run5", participant="P02", saved_at="30.11.2026 09:00")
+    with pytest.raises(
+        InputError, match=r"'saved_at' is '.*2026 .*' in a row; expected a time such as 2026-11-30"
+    ):
+        analyse(tmp_path, rows, with_rules())
+
+
+@pytest.mark.parametrize(
     ("rule", "values"),
     [
         (rules.DropFailedPlays(), {"verdict": "failed"}),
