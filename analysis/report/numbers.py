@@ -95,6 +95,18 @@ def interval(bounds: tuple[float, float], digits: int = 2) -> str:
     return f"[{fixed(low, digits)}, {fixed(high, digits)}]" if math.isfinite(low) else DASH
 
 
+def as_given(bounds: tuple[float, float]) -> str:
+    """Bounds that were chosen, with every decimal they have and at least two.
+
+    Examples
+    --------
+    >>> as_given((-0.5, 0.5)), as_given((-0.005, 0.0125))
+    ('[-0.50, 0.50]', '[-0.0050, 0.0125]')
+    """
+    decimals_given = (len(f"{bound:.6f}".rstrip("0").partition(".")[2]) for bound in bounds)
+    return interval(bounds, max(2, *decimals_given))
+
+
 def share_interval(bounds: tuple[float, float]) -> str:
     """A confidence interval of a share, without leading zeros."""
     low, high = bounds

@@ -5,7 +5,17 @@ from collections.abc import Callable
 from analysis.ranks import RankAnalysis
 from analysis.report.contents import caption, mark_name
 from analysis.report.formats import Table
-from analysis.report.numbers import DASH, apa_p, fixed, interval, p_value, share, share_interval
+from analysis.report.numbers import (
+    DASH,
+    apa_p,
+    as_given,
+    fixed,
+    interval,
+    mean_digits,
+    p_value,
+    share,
+    share_interval,
+)
 from analysis.t_tests import MeansAnalysis
 from analysis.within.simple_effects import SIGNIFICANCE
 
@@ -96,10 +106,11 @@ def pairs_table(result: RankAnalysis, name: str, synthetic: bool = False) -> Tab
 
 def mean_tests_table(result: MeansAnalysis, name: str, synthetic: bool = False) -> Table:
     """t tests of means: pairs of groups, or each group against the value."""
+    digits = mean_digits(test.se for test in result.tests)
     rows = tuple(
         (
             f"{test.first} - {test.second}",
-            fixed(test.difference),
+            fixed(test.difference, digits),
             fixed(test.t),
             fixed(test.df, 0 if float(test.df).is_integer() else 2),
             p_value(test.p_holm if test.p_games_howell is None else test.p_games_howell),
@@ -134,9 +145,10 @@ def mean_tests_table(result: MeansAnalysis, name: str, synthetic: bool = False) 
 
 def means_text(result: MeansAnalysis, name: str, synthetic: bool = False) -> str:
     """Means of the groups and Welch's ANOVA, as a paper reports them."""
+    digits = mean_digits(group.sd / group.n**0.5 for group in result.groups)
     means = "; ".join(
-        f"{group.name}: M = {fixed(group.mean)}, SD = {fixed(group.sd)}, n = {group.n}, 95% CI "
-        f"{interval(group.ci)}"
+        f"{group.name}: M = {fixed(group.mean, digits)}, SD = {fixed(group.sd, digits)}, n = {group.n}, "
+        f"95% CI {interval(group.ci, digits)}"
         for group in result.groups
     )
     said = f"{mark_name(name, synthetic)}: {means}."
@@ -165,7 +177,7 @@ def _equivalence_head(bounds: tuple[float, float] | None) -> tuple[str, ...]:
 def _equivalence_note(bounds: tuple[float, float] | None) -> tuple[str, ...]:
     if bounds is None:
         return ()
-    return (f"TOST: two one-sided tests; below .05 the difference is inside {interval(bounds)}.",)
+    return (f"TOST: two one-sided tests; below .05 the difference is inside {as_given(bounds)}.",)
 
 
 def _or_dash(form: Callable[[float], str], value: float | None) -> str:

@@ -6,6 +6,7 @@ from analysis.report.formats import Table
 from analysis.report.numbers import (
     DASH,
     apa_p,
+    as_given,
     f_text,
     fixed,
     interval,
@@ -267,18 +268,19 @@ def contrasts_table(analysis: Analysis) -> Table:
 
 def equivalence_table(analysis: Analysis) -> Table:
     """Two one-sided tests of every pair against the declared bounds."""
+    digits = mean_digits(pair.se for pair in analysis.pairs)
     rows = tuple(
         (
             analysis.labels.pair(e.cell_a, e.cell_b),
-            fixed(e.difference),
-            interval(e.ci),
+            fixed(e.difference, digits),
+            interval(e.ci, digits),
             p_value(e.p_lower),
             p_value(e.p_upper),
             "yes" if e.p < SIGNIFICANCE else "not shown",
         )
         for e in analysis.equivalence
     )
-    bounds = interval(analysis.equivalence[0].bounds) if rows else ""
+    bounds = as_given(analysis.equivalence[0].bounds) if rows else ""
     notes = (f"Two one-sided t tests (TOST) within {bounds}, α = .05; interval 90%.",)
     header = ("Margin: pair", "Diff.", "90% CI", "p lower", "p upper", "equal")
     return Table("equivalence", title_of(analysis, "Equivalence"), header, rows, 1, notes)

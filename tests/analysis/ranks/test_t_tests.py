@@ -126,3 +126,23 @@ def test_command_tests_groups_and_one_sample(tmp_path: Path) -> None:
         ended = runner.invoke(app, [*named, *more])
         assert isinstance(ended.exception, InputError)
         assert said in str(ended.exception)
+
+
+def test_means_of_seconds_are_printed_with_the_decimals_that_tell_them_apart(tmp_path: Path) -> None:
+    """With two decimals each of these groups would have M = 0.32 and SD = 0.01."""
+    path = tmp_path / "seconds.csv"
+    rows = [f"{i},{'ab'[i % 2]},{0.3 + 0.012 * (i % 4) + 0.001 * (i % 3)}" for i in range(24)]
+    path.write_text("\n".join(["id,g,y", *rows]), encoding="utf-8")
+    call = ["t-test", str(path), "--participant", "id", "--rating", "y", "--between", "g"]
+    printed = CliRunner().invoke(
+        app, [*call, "--equivalence", "0.005", "--json", str(tmp_path / "numbers.json")]
+    )
+    assert printed.exit_code == 0, printed.output
+    numbers = json.loads((tmp_path / "numbers.json").read_text(encoding="utf-8"))
+    said = " ".join(printed.output.split())
+    for group in numbers["groups"]:
+        low, high = group["ci"]
+        assert f"M = {group['mean']:.4f}, SD = {group['sd']:.4f}" in said
+        assert f"95% CI [{low:.4f}, {high:.4f}]" in said
+    assert f"{numbers['tests'][0]['difference']:.4f}" in said
+    assert "inside [-0.005, 0.005]" in said

@@ -290,3 +290,23 @@ def test_means_in_seconds_are_printed_with_the_decimals_that_tell_them_apart(tmp
     for level, mean in means.items():
         assert f"| {level} | {mean['mean']:.4f} ({mean['se']:.4f}) |" in report
         assert f"{level} (M = {mean['mean']:.4f}, SE = {mean['se']:.4f})" in report
+
+
+def test_equivalence_of_seconds_is_printed_with_the_decimals_of_its_pairs(tmp_path) -> None:
+    """Bounds of half a hundredth printed as -0.01 and 0.01 would be others than those that were tested."""
+    path = tmp_path / "seconds.csv"
+    rows = [
+        f"{i},{level},{0.3 + 0.012 * (i % 4) + 0.003 * k + 0.001 * ((i * (k + 2)) % 3)}"
+        for i in range(12)
+        for k, level in enumerate("abc")
+    ]
+    path.write_text("\n".join(["id,c,y", *rows]))
+    call = ["anova", str(path), "--participant", "id", "--rating", "y", "--within", "c"]
+    call += ["--equivalence", "0.005", "--out", str(tmp_path / "seconds")]
+    printed = CliRunner().invoke(app, call)
+    assert printed.exit_code == 0, printed.output
+    (test, *_) = json.loads((tmp_path / "seconds/results.json").read_text())["equivalence"]
+    low, high = test["ci"]
+    report = (tmp_path / "seconds/report.md").read_text(encoding="utf-8")
+    assert f"| c: a - b | {test['difference']:.5f} | [{low:.5f}, {high:.5f}] |" in report
+    assert "(TOST) within [-0.005, 0.005]" in report
