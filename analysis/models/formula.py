@@ -154,6 +154,8 @@ def model_options(formula: Formula, header: Sequence[str], numeric: Collection[s
             )
     # The grouping whose slopes correlate, else the first, takes the participants' part.
     people = (correlated or list(formula.random))[0]
+    if ":" in people.grouping and people.correlated:
+        raise InputError(f"slopes by {people.grouping} cannot correlate; write || for independent slopes")
     if "/" in people.grouping or ":" in people.grouping:
         raise InputError(f"name another grouping before the nested {people.grouping}")
     factors = tuple(n for n in formula.predictors if n in formula.as_factors or n not in numeric)

@@ -120,7 +120,8 @@ def _refuse_participants_as_items(table: TextTable, participant: str, item: Sequ
     """Items that each belong to one participant, one each, are the participants themselves."""
     if not item:
         return
-    pairs = table.columns[[participant, *item]].drop_duplicates()
+    # An item may be named by the participant's column and another one.
+    pairs = table.columns[list(dict.fromkeys([participant, *item]))].drop_duplicates()
     # A separator that no cell contains: a-b and c must differ from a and b-c.
     what = pairs[list(item)].astype(str).agg("\x1f".join, axis=1)
     people = pairs[participant].astype(str)

@@ -305,3 +305,20 @@ def test_ten_levels_in_twelve_people_are_named(tmp_path: Path) -> None:
     _levels(12, 10, 1).to_csv(file, index=False)
     with pytest.raises(InputError, match="with one rating per cell it is the residual"):
         _run(tmp_path, "mixed", file, "--formula", "score ~ face + (1 + face || id)")
+
+
+def test_a_grouping_of_participant_and_clip_may_come_before_the_clip(tmp_path: Path) -> None:
+    """(1 | participant:clip) is common in R: what one participant thinks of one clip."""
+    last = "rating ~ group + (1 | participant) + (1 | clip) + (1 | participant:clip)"
+    first = "rating ~ group + (1 | participant) + (1 | participant:clip) + (1 | clip)"
+    one, other = (_run(tmp_path, "mixed", CROSSED, "--formula", text) for text in (last, first))
+    assert other["formula"] == first
+    assert other["reml_criterion"] == pytest.approx(one["reml_criterion"], abs=1e-8)
+
+
+def test_correlated_slopes_of_a_joined_grouping_are_refused_whatever_the_order() -> None:
+    """Another grouping before it would not help: the one whose slopes correlate is the participants."""
+    formula = parse_formula("rating ~ blur + (1 | participant) + (1 + blur | face:clip)")
+    columns = ["rating", "blur", "participant", "face", "clip"]
+    with pytest.raises(InputError, match=r"slopes by face:clip cannot correlate; write \|\| for"):
+        model_options(formula, columns, {"blur"})
