@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.thresholds.answers import Answers, count_trials
 from analysis.thresholds.likelihood import CHI2_95, Array, Interval, Shape, Trials
-from analysis.thresholds.psychometric import Threshold, fit_threshold
+from analysis.thresholds.psychometric import FALLS, Threshold, fit_threshold
 from experiments.errors import InputError
 
 # Mean over people of estimates with known errors.
@@ -336,7 +336,7 @@ def fit_thresholds(
 ) -> ThresholdsResult:
     """Fit every condition over all trials and, where people are named, every person in it.
 
-    `falling` is as in `fit_threshold`.
+    If `falling` is not given, the answers decide it: with a guess rate those of all conditions together.
 
     Raises
     ------
@@ -354,12 +354,17 @@ def _fitted(
     labels = np.full(answers.x.size, "all", dtype=object) if answers.condition is None else answers.condition
     pooled: dict[str, Threshold] = {}
     people: list[PersonThreshold] = []
+    is_declared = falling is not None
+    if guess and not is_declared:
+        falling = falls_together(answers.x, answers.response, labels)
     for condition in answers.conditions():
         rows = labels == condition
         try:
-            pooled[condition] = fit_threshold(
+            fit = fit_threshold(
                 count_trials(answers.x[rows], answers.response[rows]), shape, guess, lapse, falling=falling
             )
+            noted = guess and fit.falling and not is_declared
+            pooled[condition] = replace(fit, notes=(*fit.notes, FALLS)) if noted else fit
         except InputError as error:
             where = "" if condition == "all" else f" ({condition})"
             raise InputError(f"{answers.source}{where}: {error}") from error
@@ -369,6 +374,18 @@ def _fitted(
             people += _people(answers, rows, condition, shape, guess, lapse, down)
     means = [mean for condition in pooled if (mean := mean_threshold(people, condition)) is not None]
     return ThresholdsResult(pooled, tuple(people), tuple(means), answers.x.size, answers.decisions)
+
+
+def falls_together(x: Array, response: Array, labels: NDArray[np.object_]) -> bool:
+    """Whether positive answers become rarer with x within the conditions that `labels` (n,) name.
+
+    In a condition at chance correct answers fall as often as they rise; the other conditions decide for it.
+    """
+    covariances = [
+        np.sum((x[labels == one] - x[labels == one].mean()) * response[labels == one])
+        for one in sorted(set(labels))
+    ]
+    return float(np.sum(covariances)) < 0
 
 
 def with_population(

@@ -9,7 +9,7 @@ from scipy import optimize, special, stats
 
 from analysis.thresholds.answers import Answers
 from analysis.thresholds.likelihood import Interval, normal_density
-from analysis.thresholds.people import Average, average
+from analysis.thresholds.people import Average, average, falls_together
 from analysis.thresholds.plane import Plane, PlaneShape, Points, counted_points, fit_plane
 from experiments.errors import InputError
 
@@ -328,7 +328,7 @@ def fit_planes(
 ) -> PlanesResult:
     """Fit every condition over all trials and, where people are named, every person in it and all together.
 
-    If `falling` is not given, the answers decide it.
+    If `falling` is not given, the answers decide it: with a guess rate those of all conditions together.
 
     Parameters
     ----------
@@ -353,9 +353,14 @@ def fit_planes(
     reasons: dict[str, str] = {}
     people: list[PersonPlane] = []
     population: dict[str, PopulationPlane] = {}
+    # With a guess rate, a condition at chance would fall as often as it rises.
+    if falling is None and guess:
+        falling = falls_together(answers.x, answers.response, labels)
     for condition in answers.conditions():
         rows = labels == condition
-        down = _falls(answers, rows) if falling is None else falling
+        down = falling
+        if down is None:
+            down = falls_together(answers.x[rows], answers.response[rows], labels[rows])
         fit, reason = fit_or_reason(points_of(answers, rows), shape, guess, lapse, down, middle)
         if fit is None:
             reasons[condition] = reason
@@ -377,11 +382,6 @@ def fit_planes(
         condition: means_of([one for one in people if one.condition == condition]) for condition in pooled
     }
     return PlanesResult(pooled, reasons, tuple(people), means, size, answers.decisions, population)
-
-
-def _falls(answers: Answers, rows: NDArray[np.bool_]) -> bool:
-    x, y = answers.x[rows], answers.response[rows]
-    return float(np.sum((x - x.mean()) * y)) < 0
 
 
 def points_of(answers: Answers, rows: NDArray[np.bool_] | slice = slice(None)) -> Points:

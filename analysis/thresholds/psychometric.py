@@ -24,6 +24,7 @@ NORMAL_95 = float(special.ndtri(0.975))
 # Far below what any number of answers can distinguish from 0 or 1, far above the rounding of F.
 STEP = 1e-6
 """How near its ends a function is that has reached them."""
+FALLS = "correct answers become rarer as x increases: the function falls"
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def fit_threshold(
     notes = _doubts(trials, location, log_spread, shape, lapsed, lapse is None, step) + _below(trials, guess)
     notes += _untested(trials, len(best))
     if guess and model.falling and falling is None:
-        notes.append("correct answers become rarer as x increases: the function falls")
+        notes.append(FALLS)
     low, high = float(trials.x.min()), float(trials.x.max())
     # Three ranges away F is as good as straight over the levels: its place would follow from its assumed
     # shape alone.

@@ -1,6 +1,7 @@
 """Psychometric functions against R (tests/golden/r/thresholds.R), and refusals in one line."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +103,26 @@ def test_a_person_is_fitted_in_the_direction_of_all() -> None:
     assert not other.falling
     assert any("hardly change" in note for note in other.notes)
     assert result.means[0].mean == pytest.approx(fits["a"].threshold, rel=1e-3)
+
+
+def test_a_condition_at_chance_does_not_fall_where_others_rise() -> None:
+    """Where half is right by guessing, the answers of a hard condition fall as often as they rise."""
+    x = np.arange(1.0, 6.0)
+    shares = {"easy": [12, 14, 17, 19, 20], "hard": [12, 10, 11, 10, 11], "middle": [11, 12, 13, 16, 18]}
+    answered = np.concatenate([np.repeat([1.0, 0.0], [k, 20 - k]) for own in shares.values() for k in own])
+    condition = np.repeat(list(shares), 100).astype(object)
+    answers = Answers(np.tile(np.repeat(x, 20), 3), answered, None, condition, "trials.csv", False, ())
+    assert fit_threshold(Trials(x, np.full(5, 20.0), np.array(shares["hard"], float)), guess=0.5).falling
+    with pytest.raises(InputError, match=r"trials.csv \(hard\): .* the answers hardly change with x"):
+        fit_thresholds(answers, "normal", 0.5, 0.0)
+    others = condition != "hard"
+    for sign, falls in ((1, False), (-1, True)):
+        kept = replace(
+            answers, x=sign * answers.x[others], response=answered[others], condition=condition[others]
+        )
+        fits = fit_thresholds(kept, "normal", 0.5, 0.0).pooled
+        assert [fit.falling for fit in fits.values()] == [falls, falls]
+        assert all(any("the function falls" in note for note in fit.notes) == falls for fit in fits.values())
 
 
 def test_answers_that_switch_at_once_are_said_so() -> None:
