@@ -84,8 +84,6 @@ def read_long_table(
     # With trials named, a repeat is certain; without them it is only suspected.
     if trial is not None:
         keep &= ~_repeats(table, [participant, trial], values, within)
-    else:
-        _report_copies(table, needed, values)
     measured = {name: numbers(table, name) for name in covariates}
     # After the ratings: a participant is left out for a covariate as a whole.
     for name, given in measured.items():
@@ -95,6 +93,8 @@ def read_long_table(
         raise InputError(f"{path.name}: no participant has a rating and all covariates")
     # Last, so that its counts are of rows that would otherwise be used.
     keep = answers_that_count(table, keep, "ratings")
+    if trial is None:
+        _report_copies(table, needed, values, keep)
     rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)
     return LongData(rows, path.name, tuple(table.decisions), table.synthetic, table.header)
 
@@ -149,14 +149,16 @@ def _repeats(
     return np.asarray(again, dtype=bool)
 
 
-def _report_copies(table: TextTable, names: list[str], values: NDArray[np.float64]) -> None:
-    """Say it where every cell has one trial but a few rows are there twice: probably a copied row."""
+def _report_copies(
+    table: TextTable, names: list[str], values: NDArray[np.float64], keep: NDArray[np.bool_]
+) -> None:
+    """Say it where each cell of the rows to `keep` (n,) has one trial but a few have more: probably copies."""
     # The second name is the rating; what is left describes the cell it is of.
-    cells = table.columns[[n for n in names if n in table.columns]].drop(columns=names[1])
+    cells = table.columns[keep][[n for n in names if n in table.columns]].drop(columns=names[1])
     counts = cells.groupby(list(cells.columns), observed=True).size()
     # Several trials per cell are the rule in other designs, so only the exception is named.
     if counts.median() == 1 and counts.max() > 1:
-        copies = cells.assign(_rating=values).duplicated().to_numpy()
+        copies = cells.assign(_rating=values[keep]).duplicated().to_numpy()
         more = f", {copies.sum()} of them with the same rating" if copies.any() else ""
         table.decisions.append(
             f"most cells have one row, but {int((counts > 1).sum())} have more{more}; all rows were counted "

@@ -8,7 +8,7 @@ import { cellTracePlot, tracesPlot } from "../../src/admin/kinds/continuous_rati
 
 interface DrawnMark {
   ariaLabel?: string;
-  initialize?: () => { channels: Record<string, { value: ArrayLike<unknown> }> };
+  initialize?: () => { channels: Record<string, { value: ArrayLike<unknown>; scale: string | null }> };
 }
 
 /** The values of all marks of a kind, a row per bar, point or cell. */
@@ -94,6 +94,26 @@ describe("the chart of means", () => {
       ["20 ms", "20 ms"],
       ["20 ms", "20 ms"],
     ]);
+  });
+});
+
+describe("levels whose names are colors or symbols", () => {
+  it("have the palette's colors and symbols, as the legend says", () => {
+    const speed = factor("speed", ["slow", "slow"], ["fast", "fast"]);
+    const scalesOf = (second: typeof speed) => {
+      const means = second.levels.map(({ name }) => ({
+        ...{ levels: { speed: "slow", [second.name]: name }, mean: 2, se_within: 1, low: 1, high: 3, participants: 2, people: [1, 3] },
+      }));
+      const plot = marginPlot({ factors: ["speed", second.name], means }, SCALE, [speed, second]);
+      const marks = (plot.marks ?? []).flat(2) as unknown as DrawnMark[];
+      const channels = marks.flatMap((mark) => Object.entries(mark.initialize?.().channels ?? {}));
+      return new Set(
+        channels.filter(([name]) => ["fill", "stroke", "symbol"].includes(name)).map(([name, { scale }]) => `${name}: ${scale}`),
+      );
+    };
+    const scaled = new Set(["fill: color", "stroke: color", "symbol: symbol"]);
+    expect(scalesOf(factor("ink", ["blue", "blue"], ["red", "red"]))).toEqual(scaled);
+    expect(scalesOf(factor("shape", ["circle", "circle"], ["square", "square"]))).toEqual(scaled);
   });
 });
 

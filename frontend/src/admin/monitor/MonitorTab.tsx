@@ -88,7 +88,9 @@ function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: number }) 
     // What was left in runs that are over will not come.
     ".": total((run) => (run.status === "active" && run.presence !== "dropped" ? run.trials - run.answered : 0)),
   };
-  const doubtful = runs.filter((run) => run.answered >= 10 && run.flagged + run.failed > 0.1 * run.answered);
+  // A share of fewer answers says little.
+  const judged = runs.filter((run) => run.answered >= 10);
+  const doubtful = judged.filter((run) => run.flagged + run.failed > 0.1 * run.answered);
   return (
     <Card withBorder>
       <Stack gap={6}>
@@ -113,14 +115,16 @@ function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: number }) 
             </Text>
           </Group>
         ))}
-        <Text size="sm" c="dimmed" mt={4}>
-          {doubtful.length === 0
-            ? "No run has more than 10% of its clips flagged or failed."
-            : `${doubtful.length} ${doubtful.length === 1 ? "run has" : "runs have"} more than 10% of the clips flagged or failed: ${doubtful
-                .slice(0, 3)
-                .map((run) => run.participant)
-                .join(", ")}${doubtful.length > 3 ? " …" : ""}`}
-        </Text>
+        {judged.length > 0 && (
+          <Text size="sm" c="dimmed" mt={4}>
+            {doubtful.length === 0
+              ? "No run with ten or more answers has more than 10% of its clips flagged or failed."
+              : `Of runs with ten or more answers, ${doubtful.length} ${doubtful.length === 1 ? "has" : "have"} more than 10% of the clips flagged or failed: ${doubtful
+                  .slice(0, 3)
+                  .map((run) => run.participant)
+                  .join(", ")}${doubtful.length > 3 ? " …" : ""}`}
+          </Text>
+        )}
         <Text size="sm" c="dimmed">
           Flagged or failed: frames were missing or late, or the page was left, zoomed or reloaded. Failed clips are repeated.
         </Text>

@@ -81,6 +81,9 @@ const JITTER = [0, -2, 2, -1, 1];
 /** Room of all conditions of a figure on a phone. */
 const CONDITIONS_PX = 240;
 
+/** The palette's color of a level. Plot would take levels named "blue" and "red", or "circle", for colors and symbols themselves. */
+const SHADE = { value: "colour", scale: true } as const;
+
 /** Means of one factor, or of two: the second as color and symbol; behind them participants. The report draws the same. */
 export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factors: Factors): Plot.PlotOptions {
   const [first = "", second] = margin.factors;
@@ -100,13 +103,13 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
   const marks = shades.map((shade, row) => {
     const own = rows.filter(({ colour }) => colour === shade);
     const dx = (row - (shades.length - 1) / 2) * step;
-    const ink = crossed ? { stroke: "colour" } : { stroke: BLUE };
-    const fill = crossed ? { fill: "colour", symbol: "colour" } : { fill: BLUE };
+    const ink = crossed ? { stroke: SHADE } : { stroke: BLUE };
+    const fill = crossed ? { fill: SHADE, symbol: SHADE } : { fill: BLUE };
     const points = own.flatMap((row) => row.people.map((mean, index) => ({ ...row, mean, column: index % JITTER.length })));
     const columns = JITTER.map((to, column) => ({ dx: dx + (to * step) / 8, points: points.filter((point) => point.column === column) }));
     return [
       ...columns.map((column) =>
-        Plot.dot(column.points, { x: "x", y: "mean", dx: column.dx, r: 2, fill: crossed ? "colour" : BLUE, fillOpacity: 0.45 }),
+        Plot.dot(column.points, { x: "x", y: "mean", dx: column.dx, r: 2, fill: crossed ? SHADE : BLUE, fillOpacity: 0.45 }),
       ),
       ...(crossed ? [Plot.line(own, { x: "x", y: "mean", z: "colour", dx, ...ink, strokeOpacity: 0.6 })] : []),
       Plot.ruleX(own, { x: "x", y1: "low", y2: "high", dx, ...ink, strokeWidth: 1.5 }),

@@ -126,7 +126,7 @@ function Findings({ study, findings }: { study: string; findings: readonly Findi
   return (
     <>
       <Lines title="Fix first" study={study} findings={fix} />
-      <Lines title="Then look at" study={study} findings={look} />
+      <Lines title={fix.length > 0 ? "Then look at" : "Look at"} study={study} findings={look} />
       {fine.length > 0 && (
         <details>
           <summary className="small-summary">Nothing found by {counted(fine.length, "other check")}</summary>

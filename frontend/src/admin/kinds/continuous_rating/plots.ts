@@ -38,7 +38,8 @@ export function tracesPlot({ cells, minimum, maximum }: Data, labels: Map<string
     x: TIME,
     y: { domain: [minimum, maximum], grid: true, label: "rating" },
     color: { legend: true, domain: [...labels.values()], range: PALETTE },
-    marks: [Plot.lineY(rows, { x: "time_s", y: "mean", stroke: "cell", tip: true })],
+    // With its scale: Plot would take cells named "blue" and "red" for colors themselves.
+    marks: [Plot.lineY(rows, { x: "time_s", y: "mean", stroke: { value: "cell", scale: true }, tip: true })],
   };
 }
 
