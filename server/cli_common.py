@@ -64,12 +64,16 @@ def stored_services(settings: Settings | None = None) -> Iterator[Services]:
         the spot would look as if all studies were lost, and its backup as if they were kept.
     """
     settings = settings or Settings()
-    url = checked_url(settings.resolved_database_url)
-    # Opened, a SQLite file that is not there would be.
-    if url.get_backend_name() == "sqlite" and url.database and not Path(url.database).exists():
-        raise _no_database(url.database, "no database at")
+    require_database(settings)
     with migrated_services(settings, stored=True) as services:
         yield services
+
+
+def require_database(settings: Settings) -> None:
+    """Refuse a SQLite file that is not there with InputError, before opening makes an empty one."""
+    url = checked_url(settings.resolved_database_url)
+    if url.get_backend_name() == "sqlite" and url.database and not Path(url.database).exists():
+        raise _no_database(url.database, "no database at")
 
 
 def _no_database(address: str, what: str) -> InputError:

@@ -152,7 +152,7 @@ def _repeats(
 def _report_copies(
     table: TextTable, names: list[str], values: NDArray[np.float64], keep: NDArray[np.bool_]
 ) -> None:
-    """Say it where each cell of the rows to `keep` (n,) has one trial but a few have more: probably copies."""
+    """Say it where cells of the rows to `keep` (n,) have one trial but a few have more: probably copies."""
     # The second name is the rating; what is left describes the cell it is of.
     cells = table.columns[keep][[n for n in names if n in table.columns]].drop(columns=names[1])
     counts = cells.groupby(list(cells.columns), observed=True).size()

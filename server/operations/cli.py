@@ -13,7 +13,7 @@ from rich.text import Text
 
 from experiments.command_groups import command_group
 from experiments.errors import InputError, counted
-from server.cli_common import migrated_services, out, stored_services
+from server.cli_common import migrated_services, out, require_database, stored_services
 from server.context import open_services
 from server.core.db import open_database
 from server.core.migrate import current_revision, is_up_to_date, newest_revision
@@ -61,7 +61,9 @@ def doctor(
     state, advice.
     Example: server doctor
     """
-    services = open_services(Settings())
+    settings = Settings()
+    require_database(settings)
+    services = open_services(settings)
     try:
         findings = examine(services)
     finally:

@@ -70,6 +70,13 @@ class TestTroubles:
             assert item["advice"] in " ".join(shown.split())
 
 
+def test_a_folder_without_studies_is_one_line_and_stays_as_it_is(tmp_path: Path) -> None:
+    done = run_server_command(Settings(data_folder=tmp_path, database_url=""), "doctor")
+    assert done.returncode == 2, done.stderr
+    assert f"there is no database at {tmp_path}/palpebra.sqlite" in " ".join(done.stderr.split())
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_database_that_cannot_be_opened_is_one_finding_each(tmp_path: Path) -> None:
     (tmp_path / "x.sqlite").write_bytes(b"no database at all, but long enough to be looked at" * 20)
     services = open_services(Settings(data_folder=tmp_path, database_url=f"sqlite:///{tmp_path}/x.sqlite"))
