@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import re
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,8 @@ from experiments.kinds.clip_rating import RATINGS
 from experiments.load import parse_experiment
 from experiments.manifest import MADE_ELSEWHERE, UPLOADED
 from server.accounts.identity import OPERATOR
-from server.context import Services
+from server.context import Services, open_services
+from server.core.migrate import current_revision
 from server.core.settings import Settings
 from server.core.values import now
 from server.models import Clip, Link, Study, StudyRun, StudyVersion
@@ -309,10 +311,11 @@ def test_a_folder_without_a_database_gets_none(
 def test_a_database_without_tables_gets_none(
     tmp_path: Path, empty_database_url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`server doctor` looks at one that is not there yet, and SQLite makes an empty file of a look."""
+    """An empty one, as SQLite makes it of a look at a file that is not there."""
     monkeypatch.chdir(tmp_path)
     settings = Settings(data_folder=tmp_path / "data", database_url=empty_database_url)
-    run_server_command(settings, "doctor")
+    with closing(open_services(settings).database) as database:
+        assert current_revision(database) is None
     refused = run_server_command(settings, "study", "list")
     assert refused.returncode == 2
     assert refused.stderr.startswith("error: there is an empty database at ")
