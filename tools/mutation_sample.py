@@ -4,9 +4,9 @@
 
 FOLDER holds a checkout of BASE (`git worktree add FOLDER BASE`). An expression is taken only if the same
 line, in a function of the same name, exists once in both versions. For each one the tests that import its
-module run in both versions, until the first failure. Results are appended to `out/mutation.jsonl` as they
-come, so a run that was stopped continues; without `--minutes` it runs to the end. The last lines are the
-killed shares of both versions.
+module run in both versions, until the first failure. Results are appended to `tools/house/mutation.jsonl` as
+they come, so a run that was stopped continues, also at a later commit: its expressions stay in the sample.
+Without `--minutes` it runs to the end. The last lines are the killed shares of both versions.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("server", "analysis", "experiments", "stimuli_builder", "blink_engine", "video_conversion")
-RESULTS = ROOT / "out" / "mutation.jsonl"
+RESULTS = ROOT / "tools" / "house" / "mutation.jsonl"
 SECONDS = 300
 """Longest run of the tests of one expression; a change that makes them hang counts as noticed."""
 MAX_FILES = 16
@@ -167,10 +167,13 @@ def main() -> int:
     parser.add_argument("--results", type=Path, default=RESULTS)
     given = parser.parse_args()
     before, after = sites_in(given.tree), sites_in(given.here)
-    chosen = random.Random(50).sample(sorted(set(before) & set(after)), given.count)
     given.results.parent.mkdir(exist_ok=True)
     lines = given.results.read_text(encoding="utf-8").splitlines() if given.results.is_file() else []
     known = {row["key"]: row for row in map(json.loads, lines)}
+    # What was tried stays, though later commits change what there is to choose from.
+    left = sorted((set(before) & set(after)) - set(known))
+    more = random.Random(50).sample(left, max(0, given.count - len(known)))
+    chosen = [*known, *more][: given.count]
     until = time.monotonic() + given.minutes * 60
     for key in chosen:
         if key in known or time.monotonic() > until:

@@ -126,7 +126,7 @@ def test_what_is_wrong_is_named_and_led_to(dashboard: Dashboard) -> None:
     page.get_by_label("Repeats").fill("0")
     expect(page.get_by_role("button", name="Save as a new version")).to_be_disabled()
     page.get_by_role("link", name="Study", exact=True).click()
-    page.get_by_role("link", name=re.compile(r"^blocks\.repeats")).click()
+    page.get_by_role("link", name=re.compile("^“Repeats”")).click()
     expect(page.get_by_text("expected 1 or more, got 0").first).to_be_visible()
 
 

@@ -68,7 +68,7 @@ def test_edits_of_two_tabs_are_both_kept(dashboard: Dashboard, second: Page) -> 
     expect(second.get_by_text(re.compile(r"Saved as version \d+"))).to_be_visible()
     first.get_by_role("button", name=SAVE).click()
     met = first.get_by_role("alert").filter(has_text="was saved while you edited")
-    expect(met).to_contain_text("title: A title of the second tab")
+    expect(met).to_contain_text("“Title”: A title of the second tab")
     expect(met).not_to_contain_text("You both changed")
     expect(first.get_by_label(DEBRIEF)).to_have_value("Kept next to another edit.")
     first.get_by_role("button", name=SAVE).click()

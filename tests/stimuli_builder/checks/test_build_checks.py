@@ -164,7 +164,7 @@ def test_the_command_says_what_it_made(copied: Path, tmp_path: Path) -> None:
         ("clips = 5", "clips = 3", "expected at least 4, one per check"),
         ('"first_eye"]', '"letter"]', "letter"),
         ("clips = 5", "clips = 5\ncontrast = 0.0", "expected more than 0, got 0.0"),
-        ("clips = 5", "clips = 5\ndifficulty = nan", "finite"),
+        ("clips = 5", "clips = 5\ndifficulty = nan", "expected a number, got nan"),
         (
             "clips = 5",
             "clips = 5\nwording = [{ check = 'shape', question = { en = 'q' }, choices = [] }]",
