@@ -37,7 +37,7 @@ def test_anova_and_ranks(export: Path) -> None:
     assert len(data.rows) == 4
     assert set(data.rows["participant"]) == {"p1", "p2"}
     assert "practice" in said(data.decisions)
-    assert "rows were counted" not in said(data.decisions), "practice rows are no second row of a cell"
+    assert "rows were counted" not in said(data.decisions), "practice rows are not a second row of a cell"
 
 
 @pytest.mark.parametrize("words", [("1.0", "0.0"), ("TRUE", "FALSE")])
