@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import chain, combinations
 
-from analysis.models.columns import Slopes
+from analysis.models.columns import Slopes, columns_of
 from experiments.errors import InputError, did_you_mean
 
 EXAMPLE = "rating ~ a*b*age + (1 + a | person) + (1 | clip)"
@@ -60,7 +60,7 @@ class Formula:
     @property
     def columns(self) -> tuple[str, ...]:
         """Every column that is named."""
-        groupings = [name for part in self.random for name in re.split("[/:]", part.grouping)]
+        groupings = [name for part in self.random for name in columns_of(part.grouping)]
         return tuple(dict.fromkeys((self.rating, *self.predictors, *groupings)))
 
 
