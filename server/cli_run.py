@@ -20,7 +20,8 @@ from server.accounts.endpoints import invitation_url
 from server.cli_common import migrated_services, out
 from server.context import Services
 from server.core.logs import logging_configuration
-from server.core.settings import ADDRESS_FILE, Settings, close_to_others
+from server.core.settings import ADDRESS_FILE, Settings
+from server.core.storage import close_to_others
 from server.operations.doctor import late_entry
 from server.operations.metrics import MULTIPROCESS_VARIABLE
 from server.privacy.ledger import begin_ledger

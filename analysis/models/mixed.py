@@ -12,7 +12,7 @@ from scipy.sparse import linalg
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.models.columns import ModelTerms, RandomSlopes, Slopes, Units, split_covariates, units_of
-from analysis.models.design import ModelData, model_data, refuse_group_slopes, slope_groups, unmodelled_slopes
+from analysis.models.design import ModelData, model_data
 from analysis.models.fixed_effect_tests import KenwardRoger, Uncertainty, kenward_roger, uncertainty
 from analysis.models.means import Estimate, model_means, ratio_tests
 from analysis.models.profile import Profile, with_intervals
@@ -27,8 +27,11 @@ from analysis.models.random_part import (
     fit_theta,
     formula_of,
     indistinct_variances_note,
+    refuse_group_slopes,
+    slope_groups,
     terms_of,
     theta_names,
+    unmodelled_slopes,
 )
 from analysis.models.reml import CrossProducts, Term, criterion, cross_products
 from analysis.models.residuals import mixed_checks

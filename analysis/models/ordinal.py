@@ -11,7 +11,7 @@ from scipy import optimize, special
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from analysis.models.columns import ModelTerms, Slopes, split_covariates
-from analysis.models.design import ModelData, model_data, refuse_group_slopes, slope_groups, unmodelled_slopes
+from analysis.models.design import ModelData, model_data
 from analysis.models.formula import formula_name
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters
 from analysis.models.means import Estimate, ModelMeans, RatioTest, model_means, ratio_tests
@@ -26,7 +26,13 @@ from analysis.models.ordinal_maximum import (
     newton_step,
     pooled_start,
 )
-from analysis.models.random_part import group_in_formula, random_bracket
+from analysis.models.random_part import (
+    group_in_formula,
+    random_bracket,
+    refuse_group_slopes,
+    slope_groups,
+    unmodelled_slopes,
+)
 from analysis.models.residuals import ResidualChecks, ordinal_checks
 from experiments.errors import InputError
 

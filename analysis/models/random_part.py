@@ -363,3 +363,146 @@ class MixedResult:
     means: ModelMeans | None = None
     ratio_tests: tuple[RatioTest, ...] = ()
     residuals: ResidualChecks | None = None
+
+
+# Which effects participants may differ in.
+
+
+def slope_groups(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
+    """Effects with a by-participant slope (`intercept` first), and what had to be left out.
+
+    Raises
+    ------
+    InputError
+        More correlated coefficients than ratings or participants determine; a slope that is asked for by name
+        and that the ratings do not determine.
+    """
+    if data.terms.slope_effects:
+        return _named_slopes(data, slopes)
+    if slopes == "none":
+        return ["intercept"], []
+    if slopes != "all":
+        effects = ["intercept", *data.covariate_slopes, *data.terms.within]
+        if slopes == "correlated":
+            _refuse_too_few(data, effects)
+            return effects, _many_covariances(data, effects)
+        return _without_residual_slopes(data, effects)
+    inside = data.slope_effects
+    kept, said = _without_residual_slopes(data, ["intercept", *_without_last(data, inside)])
+    last = [effect for effect in inside if effect not in _without_last(data, inside)]
+    return kept, [
+        *(f"no slope of {name}: with one rating per cell it is the residual" for name in last),
+        *said,
+    ]
+
+
+def _named_slopes(data: ModelData, slopes: Slopes) -> tuple[list[str], list[str]]:
+    """The slopes that a formula names, or one line on the first that the ratings do not determine."""
+    known = {frozenset(name.split(":")): name for name in data.effects}
+    named = [known[frozenset(name.split(":"))] for name in data.terms.slope_effects or ()]
+    participant = data.terms.participant
+    for name in named:
+        if name not in data.slope_effects:
+            raise InputError(
+                f"the slope of {name} by {participant} is not determined: it does not vary within one "
+                f"{participant}; write it outside the brackets only"
+            )
+        if name not in _without_last(data, data.slope_effects):
+            raise InputError(
+                f"the slope of {name} by {participant} is not determined: with one rating per cell it is the "
+                "residual; remove it"
+            )
+    effects = ["intercept", *named]
+    if slopes == "correlated":
+        _refuse_too_few(data, effects)
+        return effects, _many_covariances(data, effects)
+    kept, said = _without_residual_slopes(data, effects)
+    if said:
+        raise InputError(f"{said[0].replace('no slope', 'the slope')}; remove it")
+    return kept, []
+
+
+def refuse_group_slopes(data: ModelData) -> None:
+    """Refuse slopes of further groupings that the ratings do not determine."""
+    for group in data.groups[1:]:
+        effects = data.group_effects(group, "none")[1:]
+        for effect in effects:
+            columns = pd.DataFrame(data.slope_columns([effect]))
+            # Variation within at least two groups: one alone gives no variance of slopes.
+            spread = columns.groupby(group.codes).std(ddof=0).max(axis=1)
+            if int((spread > 1e-9).sum()) < 2:
+                raise InputError(
+                    f"the slope of {effect} by {group.name} is not determined: it does not vary within one "
+                    f"{group.name}; write it outside the brackets only"
+                )
+        own = 1 + sum(len(data.columns(effect)) for effect in effects)
+        # As many coefficients as ratings would leave no residual to test against.
+        if effects and own * len(group.names) >= len(data.rating):
+            raise InputError(
+                f"the slopes by {group.name} are not determined: they have {own * len(group.names)} "
+                f"coefficients, expected fewer than the {len(data.rating)} ratings; remove one"
+            )
+
+
+def _many_covariances(data: ModelData, effects: Sequence[str]) -> list[str]:
+    """What is said of a covariance matrix that few participants hardly determine."""
+    own, people = sum(len(data.columns(effect)) for effect in effects), len(data.participants.names)
+    if own * (own + 1) // 2 <= people:
+        return []
+    return [
+        f"{own * (own + 1) // 2} variances and covariances are estimated from {people} participants, who "
+        "hardly determine them; slopes that do not correlate (||, or --slopes all) need fewer"
+    ]
+
+
+def _without_last(data: ModelData, inside: list[str]) -> list[str]:
+    """Effects without the highest interaction of factors where each cell has one rating of a participant."""
+    # One number for each pair of participant and cell.
+    cells, people = len(data.fixed), data.participants
+    counts = np.bincount(people.codes * cells + data.cell, minlength=len(people.names) * cells)
+    of_factors = [effect for effect in inside if effect in data.factorial_effects]
+    if counts.max() > 1 or not of_factors:
+        return inside
+    return [effect for effect in inside if effect != of_factors[-1]]
+
+
+def _without_residual_slopes(data: ModelData, effects: list[str]) -> tuple[list[str], list[str]]:
+    """Effects without slopes of covariates that would leave participants' ratings no residual."""
+    people, ratings = len(data.participants.names), len(data.rating)
+    numbers = {effect.name for effect in data.number_effects}
+    kept, said = list(effects), []
+    # From the last on: interactions of covariates give way before the covariates themselves.
+    for name in reversed([effect for effect in effects if effect in numbers]):
+        own = sum(len(data.columns(effect)) for effect in kept)
+        if own * people < ratings:
+            break
+        kept.remove(name)
+        said.append(f"no slope of {name}: with so few ratings of each participant it is the residual")
+    return kept, said
+
+
+def _refuse_too_few(data: ModelData, effects: Sequence[str]) -> None:
+    """As many correlated random coefficients as ratings leave no residual."""
+    own = sum(len(data.columns(effect)) for effect in effects)
+    people, ratings = len(data.participants.names), len(data.rating)
+    if own >= people:
+        raise InputError(
+            f"{people} participants do not determine the covariances of {own} correlated coefficients; use "
+            "--slopes all or none, or || in a formula"
+        )
+    if own * people >= ratings:
+        raise InputError(
+            f"expected more than {own * people} ratings for {own} correlated coefficients of each of "
+            f"{people} participants, got {ratings}. With one rating per cell, use --slopes none or all"
+        )
+
+
+def unmodelled_slopes(data: ModelData, slopes: Slopes) -> list[str]:
+    """What is said of covariates that vary within participants, in a model of intercepts alone."""
+    if slopes != "none" or not data.covariate_slopes:
+        return []
+    named = ", ".join(data.covariate_slopes)
+    return [
+        f"{named} varies within participants and has no by-participant slope: if people differ in it, its p "
+        "is too small; add --slopes all"
+    ]

@@ -236,17 +236,10 @@ def _cloud(axes: Axes, x: float, values: Floats, width: float, colour: str) -> N
     if len(values) < 3 or np.ptp(values) == 0:
         return
     heights = np.linspace(values.min(), values.max(), _CLOUD_STEPS)
-    density = _density(values, heights)
+    density = stats.gaussian_kde(values)(heights)
     # Scaled to the widest place: the width of a cloud says nothing of how many it has.
     reach = x + width * density / density.max()
     axes.fill_betweenx(heights, x, reach, color=colour, alpha=0.13, linewidth=0, zorder=0)
-
-
-def _density(values: Floats, at: Floats) -> Floats:
-    """Gaussian kernels of Scott's width, n to the power of -1/5 SDs (scipy's `gaussian_kde`, unscaled)."""
-    width = values.std(ddof=1) * len(values) ** -0.2
-    kernels = np.exp(-(((at[:, None] - values) / width) ** 2) / 2)
-    return np.asarray(kernels.sum(axis=1), dtype=np.float64)
 
 
 def _arranged(analysis: Analysis, spec: FigureSpec) -> _Shown:

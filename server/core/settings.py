@@ -3,8 +3,6 @@
 import os
 import re
 import secrets
-import stat
-from collections.abc import Iterator
 from datetime import timedelta
 from email.utils import parseaddr
 from functools import cached_property
@@ -574,44 +572,3 @@ class Settings(BaseSettings):
         if self.secret_key:
             return self.secret_key.encode("utf-8")
         return kept_key(secret_key_path(self.data_folder))
-
-
-# Who may read the data folder: its owner alone.
-
-OTHERS = 0o077
-"""The rights of group and everybody."""
-
-
-def own_folders(settings: Settings) -> list[Path]:
-    """The folders that a server keeps things in: its own, and the one its hosts share."""
-    return list(dict.fromkeys((settings.data_folder, settings.common_folder)))
-
-
-def open_to_others(folder: Path) -> Iterator[Path]:
-    """The folder and everything in it that others than its owner have a right to; links are not followed."""
-    if folder.is_dir() and _is_open(folder):
-        yield folder
-    for parent, folders, files in os.walk(folder):
-        for name in (*folders, *files):
-            path = Path(parent, name)
-            if not path.is_symlink() and _is_open(path):
-                yield path
-
-
-def _is_open(path: Path) -> bool:
-    try:
-        return bool(stat.S_IMODE(path.lstat().st_mode) & OTHERS)
-    except FileNotFoundError:  # a temporary file that has gone meanwhile
-        return False
-
-
-def close_to_others(settings: Settings) -> None:
-    """Take from others what an older version, or another program, left open to them.
-
-    Files of other users stay unchanged; the doctor reports them.
-    """
-    for path in (one for folder in own_folders(settings) for one in open_to_others(folder)):
-        try:
-            path.chmod(stat.S_IMODE(path.lstat().st_mode) & ~OTHERS)
-        except OSError:
-            continue

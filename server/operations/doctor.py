@@ -23,7 +23,8 @@ from server.core.db import COUNTING_POOL
 from server.core.migrate import current_revision, is_up_to_date
 from server.core.row_security import OLDEST_POSTGRES as OLDEST_WITH_WALL
 from server.core.row_security import ROLE
-from server.core.settings import KEY_LENGTH_MIN, Settings, open_to_others, own_folders, secret_key_path
+from server.core.settings import KEY_LENGTH_MIN, Settings, secret_key_path
+from server.core.storage import open_to_others, own_folders
 from server.core.values import now
 from server.operations import repository
 from server.operations.metrics import seen_proxy

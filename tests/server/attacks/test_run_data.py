@@ -12,8 +12,8 @@ import pytest
 
 from server.context import Services
 from server.core import storage
-from server.core.settings import Settings, open_to_others
-from server.core.storage import ClipsAway
+from server.core.settings import Settings
+from server.core.storage import ClipsAway, open_to_others
 from server.models import StudyRun
 from server.participation import current_run
 from tests.helpers.databases import run_server_command

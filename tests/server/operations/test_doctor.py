@@ -11,7 +11,8 @@ from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from server.app import create_app
 from server.context import Services, open_services
-from server.core.settings import Settings, close_to_others
+from server.core.settings import Settings
+from server.core.storage import close_to_others
 from server.core.values import now
 from server.models import AuditEntry
 from server.operations.doctor import CHECKS, Finding, examine, ledger
