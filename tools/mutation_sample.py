@@ -4,17 +4,20 @@
 
 FOLDER holds a checkout of BASE (`git worktree add FOLDER BASE`). An expression is taken only if the same
 line, in a function of the same name, exists once in both versions. For each one the tests that import its
-module run in both versions, until the first failure. Results are appended to `tools/house/mutation.jsonl` as
-they come, so a run that was stopped continues, also at a later commit: its expressions stay in the sample.
-Without `--minutes` it runs to the end. The last lines are the killed shares of both versions.
+module run in both versions, until the first failure, and the test that failed runs again without the change.
+Results are appended to `tools/house/mutation.jsonl` as they come, so a run that was stopped continues, also
+at a later commit: its expressions stay in the sample. Without `--minutes` it runs to the end. The last lines
+are the killed shares of both versions.
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
+import compileall
 import copy
 import json
+import os
 import random
 import re
 import subprocess
@@ -22,15 +25,19 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("server", "analysis", "experiments", "stimuli_builder", "blink_engine", "video_conversion")
 RESULTS = ROOT / "tools" / "house" / "mutation.jsonl"
 SECONDS = 300
-"""Longest run of the tests of one expression; a change that makes them hang counts as noticed."""
-MAX_FILES = 16
+"""Most processor seconds for the tests of one expression: a change that makes them loop counts as noticed.
+
+Not seconds of the clock, or a busy machine would count as a loop. A run that only waits ends after four times
+as long.
+"""
+MAX_FILES = 6
+BROKEN_MAX = 5
 SLOW = re.compile(r"tests/(browser|experiments_e2e|docs|bench|scope|equal|house|server/attacks)")
 SWAPS: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.LtE,
@@ -125,33 +132,106 @@ def tests_of(site: Site, tree: Path) -> list[str]:
     return [str(path.relative_to(tree)) for path in named[:MAX_FILES]]
 
 
-def outcome(site: Site, tree: Path) -> str:
-    """`killed`, `survived`, or `untested` where no test imports the module or its tests fail anyway."""
-    tests = tests_of(site, tree)
-    if not tests or not _passes_unchanged(tuple(tests), tree):
-        return "untested"
+class Trials:
+    """Runs tests in one version, each time in a fresh copy of a process that has the libraries loaded."""
+
+    def __init__(self, tree: Path) -> None:
+        """Compile the version, and start the process that is copied."""
+        self.tree = tree
+        self.short = ["-m", "not long"] if (tree / "tests" / "tiers.toml").is_file() else []
+        for package in (*PACKAGES, "tests"):
+            compileall.compile_dir(str(tree / package), quiet=2)
+        # A module changed twice in a second would be taken from the compiled file of the first change.
+        environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "OPENBLAS_NUM_THREADS": "1"}
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", PROCESS, str(SECONDS)],
+            cwd=tree,
+            env=environment,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+
+    def first_failure(self, tests: Sequence[str], without: Sequence[str] = ()) -> str | None:
+        """The first test that fails (or `""` where the run itself ended badly), and None where all pass."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        skipped = [f"--deselect={name}" for name in without]
+        self.process.stdin.write(json.dumps(["-q", "-x", "-n", "0", *self.short, *skipped, *tests]) + "\n")
+        self.process.stdin.flush()
+        failure: str | None = json.loads(self.process.stdout.readline())
+        return failure
+
+
+PROCESS = """
+import importlib, json, os, resource, signal, sys, tempfile, time
+
+LIBRARIES = "numpy scipy.stats pandas statsmodels.api pingouin sqlalchemy pydantic cv2"
+for name in LIBRARIES.split():
+    importlib.import_module(name)
+sys.path.insert(0, os.getcwd())
+
+
+class Noted:
+    failed = None
+
+    def pytest_runtest_logreport(self, report):
+        if report.failed and self.failed is None:
+            self.failed = report.nodeid
+
+
+def run(arguments, answer):
+    os.setsid()
+    resource.setrlimit(resource.RLIMIT_CPU, (int(sys.argv[1]), int(sys.argv[1])))
+    silent = os.open(os.devnull, os.O_RDWR)
+    for number in (0, 1, 2):
+        os.dup2(silent, number)
+    noted = Noted()
+    code = pytest.main(arguments, plugins=[noted])
+    with open(answer, "w") as file:
+        json.dump(None if code in (0, 5) else noted.failed or "", file)
+    os._exit(0)
+
+
+import pytest
+
+for line in sys.stdin:
+    with tempfile.TemporaryDirectory() as folder:
+        answer = os.path.join(folder, "answer")
+        child = os.fork()
+        if child == 0:
+            run(json.loads(line), answer)
+        until = time.monotonic() + 4 * int(sys.argv[1])
+        while os.waitpid(child, os.WNOHANG) == (0, 0) and time.monotonic() < until:
+            time.sleep(0.02)
+        try:
+            os.killpg(child, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        failure = open(answer).read() if os.path.exists(answer) else json.dumps("")
+    print(failure, flush=True)
+"""
+
+
+def outcome(site: Site, trials: Trials) -> str:
+    """`killed`, `survived`, or `untested` where no test imports the module or all that fail do so anyway."""
+    tests = tests_of(site, trials.tree)
     original = site.file.read_text(encoding="utf-8")
-    try:
-        site.file.write_text(changed_source(site), encoding="utf-8")
-        return "survived" if _passes(tests, tree) else "killed"
-    finally:
-        site.file.write_text(original, encoding="utf-8")
-
-
-@cache
-def _passes_unchanged(tests: tuple[str, ...], tree: Path) -> bool:
-    """Whether the tests pass without a change: sites of one module ask it once."""
-    return _passes(tests, tree)
-
-
-def _passes(tests: Sequence[str], tree: Path) -> bool:
-    short = ["-m", "not long"] if (tree / "tests" / "tiers.toml").is_file() else []
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", "0", *short, *tests]
-    try:
-        done = subprocess.run(command, cwd=tree, capture_output=True, timeout=SECONDS, check=False)
-    except subprocess.TimeoutExpired:
-        return False
-    return done.returncode == 0
+    broken: list[str] = []
+    while tests:
+        try:
+            site.file.write_text(changed_source(site), encoding="utf-8")
+            failure = trials.first_failure(tests, broken)
+        finally:
+            site.file.write_text(original, encoding="utf-8")
+        if failure is None:
+            return "survived"
+        if trials.first_failure([failure] if failure else tests, broken) is None:
+            return "killed"
+        if not failure or len(broken) == BROKEN_MAX:
+            return "untested"
+        broken.append(failure)
+    return "untested"
 
 
 def main() -> int:
@@ -166,7 +246,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--results", type=Path, default=RESULTS)
     given = parser.parse_args()
-    before, after = sites_in(given.tree), sites_in(given.here)
+    before, after = sites_in(given.tree.resolve()), sites_in(given.here.resolve())
     given.results.parent.mkdir(exist_ok=True)
     lines = given.results.read_text(encoding="utf-8").splitlines() if given.results.is_file() else []
     known = {row["key"]: row for row in map(json.loads, lines)}
@@ -175,12 +255,13 @@ def main() -> int:
     more = random.Random(50).sample(left, max(0, given.count - len(known)))
     chosen = [*known, *more][: given.count]
     until = time.monotonic() + given.minutes * 60
+    old, new = Trials(given.tree.resolve()), Trials(given.here.resolve())
     for key in chosen:
         if key in known or time.monotonic() > until:
             continue
         row = {"key": key, "base": given.base}
-        row["before"] = outcome(before[key], given.tree)
-        row["after"] = outcome(after[key], given.here)
+        row["before"] = outcome(before[key], old)
+        row["after"] = outcome(after[key], new)
         known[key] = row
         with given.results.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
