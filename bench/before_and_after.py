@@ -1,7 +1,9 @@
-"""What ratings, the start of a run and `analysis run exp3` cost compared with an earlier revision, in one
-run.
+"""What ratings, the start of a run, the commands, clips and pages cost compared with an earlier revision, in
+one run.
 
-    python -m bench.before_and_after [REVISION, default c84c2e8] [rounds, default 3]
+    python -m bench.before_and_after [REVISION, default c84c2e8] [rounds, default 3] [parts, default all]
+
+The parts are `ratings`, `commands`, `clips` and `pages`, with commas between them.
 
 Both revisions run with the packages of this one, in turns, so that load and machine are the same for both.
 Of the project only what every revision has is used: the tests' own server and participant.
@@ -9,6 +11,8 @@ Of the project only what every revision has is used: the tests' own server and p
 
 import json
 import os
+import re
+import resource
 import statistics
 import subprocess
 import sys
@@ -76,6 +80,65 @@ def analysis(folder: Path) -> dict[str, float]:
     }
 
 
+def commands(folder: Path) -> dict[str, float]:
+    """Processor time of each program's `--help`, and of an ANOVA of a table of 32 participants."""
+    figures = {}
+    for program in ("server", "stimuli_builder", "analysis"):
+        ask = [sys.executable, "-c", f"from {program}.cli import main; main()", "--help"]
+        figures[f"{program} --help (s)"] = _least_processor_s(ask, folder)
+    run = [sys.executable, "-c", "from analysis.cli import main; main()"]
+    table = folder / "anova.csv"
+    subprocess.run([*run, "synthesise", "exp3", "--out", str(table)], check=True, stdout=subprocess.DEVNULL)
+    tested = [*run, "anova", str(table), "--within", "lower_lid", "--participant", "participant"]
+    tested += ["--rating", "response"]
+    figures["analysis anova (s)"] = _least_processor_s(tested, folder)
+    return figures
+
+
+def clips(folder: Path) -> dict[str, float]:
+    """Processor time of the 160 clips of Exp 3, built by one process with nothing cached."""
+    build = [sys.executable, "-c", "from stimuli_builder.cli import main; main()", "build", "exp3"]
+    before = _processor_s_of_children()
+    subprocess.run(
+        [*build, "--out", str(folder / "clips"), "--workers", "1"], check=True, stdout=subprocess.DEVNULL
+    )
+    return {"clips of exp3 (s)": _processor_s_of_children() - before}
+
+
+def pages(folder: Path) -> dict[str, float]:
+    """What each site loads at first, gzipped, counted by each revision, with the packages installed here."""
+    frontend = Path("frontend").resolve()
+    if frontend != ROOT / "frontend":
+        (frontend / "node_modules").symlink_to(ROOT / "frontend" / "node_modules")
+        for site in SITES:
+            vite = ["node_modules/.bin/vite", "build", "-c", f"vite.{site}.config.ts", "--logLevel", "error"]
+            subprocess.run(vite, check=True, stdout=sys.stderr, cwd=frontend)
+    figures = {}
+    for site in SITES:
+        size = ["node", "scripts/bundle_size.mjs", site]
+        said = subprocess.run(size, check=False, capture_output=True, text=True, cwd=frontend).stdout
+        figures[f"{site} pages at first (KB, gzipped)"] = max(map(int, TOTAL.findall(said))) / 1024
+    return figures
+
+
+SITES = ("participant", "admin")
+TOTAL = re.compile(r"^ *([0-9]+)  .*gzipped; budget", re.MULTILINE)
+
+
+def _least_processor_s(command: list[str], folder: Path) -> float:
+    spent = []
+    for _ in range(ANALYSES):
+        before = _processor_s_of_children()
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=folder)
+        spent.append(_processor_s_of_children() - before)
+    return min(spent)
+
+
+def _processor_s_of_children() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def _shortest(command: list[str], folder: Path) -> float:
     times = []
     for number in range(ANALYSES):
@@ -89,24 +152,32 @@ def _shortest(command: list[str], folder: Path) -> float:
 EVIDENCE = {"evidence": "record"} if os.environ.get("RECORDS_EVIDENCE") else {}
 
 
-def measured(tree: Path, folder: Path) -> dict[str, float]:
+PARTS = {
+    "ratings": lambda folder: rating_path(folder) | analysis(folder),
+    "commands": commands,
+    "clips": clips,
+    "pages": pages,
+}
+
+
+def measured(tree: Path, folder: Path, parts: str) -> dict[str, float]:
     """One round of one revision."""
     settings = {"PALPEBRA_DATA_FOLDER": str(folder / "none")}
     server = tree / "server"
     if (server / "evidence").is_dir() or (server / "participation" / "evidence.py").is_file():
         settings["RECORDS_EVIDENCE"] = "1"  # as tests' participants bring none
     folder.mkdir()
-    figures: dict[str, float] = figures_of(tree, __file__, folder, **settings)
+    figures: dict[str, float] = figures_of(tree, __file__, folder, parts, **settings)
     return figures
 
 
-def main(revision: str = "c84c2e8", rounds: str = "3") -> None:
+def main(revision: str = "c84c2e8", rounds: str = "3", parts: str = ",".join(PARTS)) -> None:
     """Print each figure of both revisions, and the ratio."""
     before, after = [], []
     with tempfile.TemporaryDirectory() as temporary, earlier_tree(revision) as old:
         for number in range(int(rounds)):
-            before.append(measured(old, Path(temporary, f"before-{number}")))
-            after.append(measured(ROOT, Path(temporary, f"after-{number}")))
+            before.append(measured(old, Path(temporary, f"before-{number}"), parts))
+            after.append(measured(ROOT, Path(temporary, f"after-{number}"), parts))
     say(f"{'load ' + ' '.join(f'{x:.1f}' for x in os.getloadavg()):<46} {revision:>9} {'here':>9} ratio")
     for name in before[0]:
         then = statistics.median(one[name] for one in before)
@@ -116,7 +187,9 @@ def main(revision: str = "c84c2e8", rounds: str = "3") -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["measure"]:
-        target = Path(sys.argv[2])
-        say(json.dumps(rating_path(target) | analysis(target)))
+        figures: dict[str, float] = {}
+        for part in sys.argv[3].split(","):
+            figures |= PARTS[part](Path(sys.argv[2]))
+        say(json.dumps(figures))
     else:
         main(*sys.argv[1:])
