@@ -20,6 +20,7 @@ import json
 import os
 import random
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -246,6 +247,8 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--results", type=Path, default=RESULTS)
     given = parser.parse_args()
+    # Else a stop by a signal would leave a changed expression in the tree.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     before, after = sites_in(given.tree.resolve()), sites_in(given.here.resolve())
     given.results.parent.mkdir(exist_ok=True)
     lines = given.results.read_text(encoding="utf-8").splitlines() if given.results.is_file() else []
