@@ -195,11 +195,24 @@ def locate(name_or_path: str) -> Path:
         raise InputError(
             f"there is no file {name_or_path}; expected a TOML file or one of {', '.join((*SHIPPED, *DEMOS))}"
         )
+    raise UnknownExperimentError(_unknown_name(name_or_path, stem))
+
+
+def _unknown_name(name: str, stem: str) -> str:
+    """What to do about a name that is not shipped: one like it, a file without its ending, or a study."""
     names = (*SHIPPED, *DEMOS)
-    near = nearest(stem, names)
-    hint = f"; did you mean '{near}'? Expected" if near else "; expected"
-    raise UnknownExperimentError(
-        f"no experiment '{name_or_path}'{hint} one of: {', '.join(names)}, or the path of a TOML file"
+    expected = f"expected one of: {', '.join(names)}, or the path of a TOML file"
+    if Path(f"{name}.toml").is_file():
+        return f"no experiment '{name}'; for the file of this name, write {name}.toml"
+    begins = (shipped for shipped in names if len(stem) > 3 and shipped.startswith(stem))
+    near = next(begins, None) or nearest(stem, names, cutoff=0.7)
+    if near:
+        return f"no experiment '{name}'; did you mean '{near}'? E{expected[1:]}"
+    if "/" in name:
+        return f"no experiment '{name}'; {expected}"
+    return (
+        f"no experiment '{name}'; {expected}. For a study made in the browser, open its Design tab, download "
+        f"the definition and write {name}.toml"
     )
 
 

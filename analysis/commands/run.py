@@ -18,6 +18,7 @@ from experiments.errors import InputError
 from experiments.files import check_folder
 
 if TYPE_CHECKING:
+    from analysis.read.pool import Pool
     from experiments.declaration.experiment import Experiment
 
 
@@ -36,7 +37,9 @@ def register(app: typer.Typer) -> None:
 
 
 def run(
-    experiment: Annotated[str, typer.Argument(help="exp1 to exp3, a demo, or a TOML file.")],
+    experiment: Annotated[
+        str, typer.Argument(help="exp1 to exp3, a demo, a TOML file, or a study in the database.")
+    ],
     database: Annotated[
         str | None,
         typer.Option(
@@ -133,12 +136,12 @@ def run(
         raise InputError("--database and --csv cannot be combined; use one")
     if verify_with_r and not report:
         raise InputError("--verify-with-r needs the report; remove --no-report")
-    declared = _declared_experiment(experiment)
+    pool = Pool(PoolOrigin(origin.value) if origin else None, series, version)
+    declared, study = _declared_experiment(experiment, None if csv else database or stored_at(), study, pool)
     reading = plan_of(declared.trial.kind).reading
     folder = out or Path("out") / "analysis" / declared.name
     if report:
         check_folder(folder)
-    pool = Pool(PoolOrigin(origin.value) if origin else None, series, version)
     try:
         with progress_spinner("reading answers"):
             answers = (
@@ -160,16 +163,24 @@ def run(
     show(contents)
 
 
-def _declared_experiment(name_or_path: str) -> "Experiment":
-    from experiments.load import UnknownExperimentError, load_experiment
+def _declared_experiment(
+    name_or_path: str, database: str | None, study: str | None, pool: "Pool"
+) -> tuple["Experiment", str | None]:
+    """The experiment and the study to read: a shipped one, a file, or a study of the database, by name."""
+    from experiments.load import UnknownExperimentError, load_experiment, parse_experiment
 
     try:
-        return load_experiment(name_or_path, has_data=True)
+        return load_experiment(name_or_path, has_data=True), study
     except UnknownExperimentError as error:
-        if "/" in name_or_path or name_or_path.endswith(".toml"):
+        if "/" in name_or_path or Path(f"{name_or_path}.toml").is_file():
             raise
-        # A study has a name on the server too, by which its declaration cannot be read here.
+        if database is not None and study in (None, name_or_path):
+            from analysis.read.database import stored_definition
+
+            toml = stored_definition(database, name_or_path, pool.series, pool.version)
+            if toml is not None:
+                return parse_experiment(toml, name_or_path, has_data=True), name_or_path
+        # Its Design tab has the definition, and its Data tab the answers.
         raise InputError(
-            f"{error}. To analyze a study on a server, use its TOML file: run `server export NAME --format "
-            "psych-ds --out NAME.zip` and look in materials/"
+            f"{error}. With the CSV from its Data tab: analysis run {name_or_path}.toml --csv FILE"
         ) from error

@@ -15,6 +15,7 @@ from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, NoRatingsError, Reading
 from analysis.read.text_table import categorical
 from experiments.errors import InputError
 from experiments.files import with_driver
+from table_files import counted
 
 PORTION = 20_000
 KINDS = ("main", "attention")
@@ -113,6 +114,51 @@ class AnswersQuery:
                 yield portion
         finally:
             cursor.close()
+
+
+def stored_definition(url: str, study: str, series: int | None, version: int | None) -> str | None:
+    """The TOML text of a study in this database: the newest version of the only, or the given, data series.
+
+    None if there is no such database or study, or these tables may not be read.
+
+    Raises
+    ------
+    InputError
+        A URL that cannot be used, a series or version that the study does not have, or several data series
+        and none given: their definitions differ.
+    """
+    _describe(url)
+    engine = create_engine(with_driver(url))
+    file = engine.url.database if engine.url.get_backend_name() == "sqlite" else None
+    if file and not Path(file).is_file():
+        return None
+    query = text(
+        "SELECT v.number, v.series, v.definition_toml FROM study_versions v "
+        "JOIN studies s ON s.id = v.study_id WHERE s.name = :study ORDER BY v.number"
+    )
+    try:
+        with engine.connect() as connection:
+            rows = [tuple(row) for row in connection.execute(query, {"study": study})]
+    except DBAPIError:
+        return None
+    finally:
+        engine.dispose()
+    if not rows:
+        return None
+    every = sorted({row[1] for row in rows})
+    if version is None and series is None and len(every) > 1:
+        options = " or ".join(f"--series {number}" for number in every)
+        raise InputError(
+            f"study '{study}' has {len(every)} data series with different definitions; choose one with "
+            f"{options}"
+        )
+    fits = [row for row in rows if version in (None, row[0]) and series in (None, row[1])]
+    if not fits:
+        of = f"version {version}" if version is not None else f"data series {series}"
+        raise InputError(
+            f"study '{study}' has no {of}; it has {counted(len(rows), 'version')} in {len(every)} data series"
+        )
+    return str(fits[-1][2])
 
 
 class _Codes:

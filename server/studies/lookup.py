@@ -43,7 +43,13 @@ def study_with_rights(
     study = workspaces.study_seen_by(session, name, identity)
     if study is None:
         names = workspaces.study_names_seen_by(session, identity)
-        raise UnknownStudy(f"There is no study '{name[:60]}'{did_you_mean(name, names)}")
+        hint = did_you_mean(name, names)
+        if not names and isinstance(identity, Operator):
+            hint = (
+                "; this database has no studies. If the server uses another data folder, set "
+                "PALPEBRA_DATA_FOLDER to the one that it printed"
+            )
+        raise UnknownStudy(f"There is no study '{name[:60]}'{hint}")
     if isinstance(identity, Operator):
         return study, frozenset(RIGHTS)
     rights = workspaces.rights_on(session, [study], identity)[study.id]

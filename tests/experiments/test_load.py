@@ -71,6 +71,23 @@ def test_an_unknown_experiment_is_refused_with_the_nearest() -> None:
         InputError, match=r"'exp9'; did you mean 'exp3'\? Expected one of: exp1, exp2, exp3, pairs"
     ):
         load_experiment("exp9")
+    with pytest.raises(InputError, match=r"no experiment 'pairs'; did you mean 'pairs-demo'\?"):
+        load_experiment("pairs")
+    with pytest.raises(
+        InputError, match=r"^no experiment 'motion'; expected .* browser, .*write motion.toml$"
+    ):
+        load_experiment("motion")
+    with pytest.raises(InputError, match=r"^no experiment 'in/motion'; expected .* path of a TOML file$"):
+        load_experiment("in/motion")
+
+
+def test_a_file_given_without_its_ending_is_named(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "motion.toml").write_text("")
+    with pytest.raises(
+        InputError, match=r"^no experiment 'motion'; for the file of this name, write motion.toml$"
+    ):
+        load_experiment("motion")
 
 
 def test_a_missing_file_is_named() -> None:

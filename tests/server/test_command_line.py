@@ -45,6 +45,13 @@ def add(settings: Settings, sources: Path, *options: str):
     )
 
 
+def test_a_database_without_studies_may_be_the_wrong_one(settings: Settings, services: Services) -> None:
+    export = run_server_command(settings, "export", "motion", "--out", "-")
+    assert export.returncode == 2
+    assert "There is no study 'motion'; this database has no studies. If the server" in export.stderr
+    assert export.stderr.endswith("set PALPEBRA_DATA_FOLDER to the one that it printed\n")
+
+
 def test_a_study_from_files_to_data(settings: Settings, services: Services, sources: Path) -> None:
     added = add(settings, sources, "--open")
     assert added.returncode == 0, added.stderr

@@ -1,6 +1,8 @@
 """The commands as a person calls them: outputs, exit codes, one line for what is wrong."""
 
 import json
+import sqlite3
+from contextlib import closing
 
 import pytest
 from typer.testing import CliRunner
@@ -9,7 +11,7 @@ from analysis.cli import app
 from analysis.paper.printed import SHIPPED
 from experiments.command_line import run_command_line
 from experiments.errors import InputError
-from experiments.load import load_experiment
+from experiments.load import load_experiment, locate
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 from tests.analysis.study_database import make_database
 
@@ -101,15 +103,50 @@ def test_run_of_an_empty_export_exits_1(tmp_path) -> None:
     assert "has a header but no ratings yet" in result.stderr
 
 
-def test_a_study_of_a_server_is_analysed_by_its_file(monkeypatch, capsys) -> None:
+def test_a_study_in_the_database_is_analysed_by_its_name(tmp_path, monkeypatch) -> None:
+    monkeypatch.delenv("DATABASE_URL", raising=False)
+    monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path))
+    people = list("abcdef")
+    make_database(tmp_path / "palpebra.sqlite", EXP3, simulate(EXP3, 6), participants=people)
+    with closing(sqlite3.connect(tmp_path / "palpebra.sqlite")) as database, database:
+        database.execute(
+            "UPDATE study_versions SET definition_toml = ?", (locate("exp3").read_text("utf-8"),)
+        )
+        database.execute("UPDATE studies SET name = 'motion'")
+    found = call("run", "motion", "--no-report")
+    assert found.exit_code == 0, found.output
+    assert "6 participants, from palpebra.sqlite" in found.stdout
+    assert found.stdout == call("run", "exp3", "--no-report").stdout
+    with pytest.raises(
+        InputError, match=r"study 'motion' has no version 2; it has 1 version in 1 data series"
+    ):
+        call_raising("run", "motion", "--version", "2")
+    with closing(sqlite3.connect(tmp_path / "palpebra.sqlite")) as database, database:
+        row = "study_id, 2, experiment, definition_toml, definition, 'x', manifest, note, created_at, 2"
+        names = "study_id, number, experiment, definition_toml, definition, definition_sha256, manifest, note"
+        database.execute(
+            f"INSERT INTO study_versions ({names}, created_at, series) SELECT {row} FROM study_versions"
+        )
+    with pytest.raises(InputError, match=r"has 2 data series.*choose one with --series 1 or --series 2"):
+        call_raising("run", "motion")
+    assert call("run", "motion", "--no-report", "--series", "1").exit_code == 0
+
+
+def call_raising(*arguments: str) -> None:
+    CliRunner().invoke(app, arguments, catch_exceptions=False)
+
+
+def test_an_unknown_study_is_refused_with_what_to_download(monkeypatch, capsys, tmp_path) -> None:
+    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["analysis", "run", "motion"])
     with pytest.raises(SystemExit) as end:
         run_command_line(app)
     assert end.value.code == 2
     told = capsys.readouterr().err
     assert told.startswith("error: no experiment 'motion'")
-    assert ". To analyze a study on a server, use its TOML file: run" in told
-    assert "file: run `server export NAME --format psych-ds --out NAME.zip`" in told
+    assert "timing-continuous, or the path of a TOML file. For a study made in the browser, open its" in told
+    assert "Design tab, download the definition and write motion.toml. With the CSV from its Data" in told
+    assert told.endswith("tab: analysis run motion.toml --csv FILE\n")
 
 
 def test_a_seed_below_zero_is_a_usage_error() -> None:

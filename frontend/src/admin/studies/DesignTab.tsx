@@ -1,4 +1,4 @@
-import { Accordion, Card, Code, Stack, Title } from "@mantine/core";
+import { Accordion, Button, Card, Code, Stack, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { type Schemas, studyQuery } from "../api";
@@ -34,6 +34,15 @@ export function DesignTab() {
                 <Code block tabIndex={0} aria-label="Definition">
                   {detail.toml}
                 </Code>
+                <Button
+                  component="a"
+                  variant="default"
+                  mt="sm"
+                  href={`/api/admin/studies/${study}/versions/${String(detail.summary.version)}`}
+                  download={`${study}.toml`}
+                >
+                  Download {study}.toml
+                </Button>
               </Accordion.Panel>
             </Accordion.Item>
           </Accordion>
