@@ -21,6 +21,8 @@ Bounds = tuple[float, float] | None
 Side = Literal["two-sided", "greater", "less"]
 EXACT_MAX = 50
 """Without ties the exact distribution is used below this many participants, as in R."""
+DIGITS = 11
+"""Significant digits that decide whether values or differences are tied."""
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,8 @@ def rank_within(factor: str, levels: Sequence[str], values: Floats, bounds: Boun
     people, count = values.shape
     if count < 2 or people < 2:
         raise InputError(f"'{factor}': expected two levels and two participants, got {count} and {people}")
+    places = _places(values)
+    given, values = values, np.round(values, places)
     # Ranks without any difference divide by 0 in Friedman's test.
     if np.all(values == values[:, :1]):
         raise InputError(f"'{factor}': every participant rates all levels alike; there is nothing to rank")
@@ -135,7 +139,7 @@ def rank_within(factor: str, levels: Sequence[str], values: Floats, bounds: Boun
     ranks = np.apply_along_axis(stats.rankdata, 1, values)
     test = RankTest("Friedman", *_friedman(ranks), *_kendall_w(ranks))
     pairs = [
-        _signed_ranks(levels[a], levels[b], values[:, a] - values[:, b], bounds)
+        _signed_ranks(levels[a], levels[b], given[:, a] - given[:, b], places, bounds)
         for a, b in combinations(range(count), 2)
     ]
     return RankAnalysis(
@@ -170,11 +174,12 @@ def rank_against(
     InputError
         A level at which everybody's value is the one tested against.
     """
+    places = _places(np.append(np.concatenate(list(groups)), value))
     for name, group in zip(levels, groups, strict=True):
-        if np.all(group == value):
+        if np.all(np.round(group - value, places) == 0):
             raise InputError(f"every value of {name} is {value:g}; there is nothing to rank")
     pairs = [
-        _signed_ranks(name, f"{value:g}", group - value, bounds)
+        _signed_ranks(name, f"{value:g}", group - value, places, bounds)
         for name, group in zip(levels, groups, strict=True)
     ]
     return RankAnalysis(
@@ -211,7 +216,9 @@ def rank_between(
     """
     if len(groups) < 2 or min(map(len, groups)) < 1:
         raise InputError(f"'{factor}': expected at least two groups with a participant each")
-    together = np.concatenate(list(groups))
+    places = _places(np.concatenate(list(groups)))
+    given, groups = groups, [np.round(group, places) for group in groups]
+    together = np.concatenate(groups)
     if np.all(together == together[0]):
         raise InputError(f"'{factor}': all values are alike; there is nothing to rank")
     # Over all participants together, which Dunn and Conover need.
@@ -224,7 +231,7 @@ def rank_between(
     p_dunn = holm(np.array([p for _, p in dunn]))
     pairs = []
     for number, (a, b) in enumerate(combinations(range(len(groups)), 2)):
-        pair = _rank_sum(levels[a], levels[b], groups[a], groups[b], bounds)
+        pair = _rank_sum(levels[a], levels[b], given[a], given[b], places, bounds)
         pairs.append(replace(pair, dunn_z=dunn[number][0], dunn_p_holm=float(p_dunn[number])))
     return RankAnalysis(
         factor,
@@ -260,11 +267,18 @@ def _kendall_w(ranks: Floats) -> tuple[float, float, float]:
     return concordance(ranks), *_interval([ranks], lambda drawn: concordance(drawn[0]))
 
 
-def _signed_ranks(first: str, second: str, differences: Floats, bounds: Bounds) -> RankPair:
+def _places(values: Floats) -> int:
+    # Means of trials carry rounding errors: 13/3 - 4 and 7/3 - 2 are tied, though not to the last bit.
+    most = float(np.abs(values).max())
+    return DIGITS - int(np.ceil(np.log10(most))) if most > 0 else DIGITS
+
+
+def _signed_ranks(first: str, second: str, given: Floats, places: int, bounds: Bounds) -> RankPair:
+    differences = np.round(given, places)
     changed = differences[differences != 0]
     low, high = _interval([differences], lambda drawn: _signed_biserial(drawn[0]))
     # Shifted by a bound, the same test asks whether differences lie beyond it.
-    equal = _equivalent(bounds, lambda bound, side: _wilcoxon(differences - bound, side)[0])
+    equal = _equivalent(bounds, lambda bound, side: _wilcoxon(np.round(given - bound, places), side)[0])
     if len(changed) == 0:
         alike = RankPair(first, second, len(differences), 0.0, False, 1.0, 1.0, 1.0, 0.0, low, high)
         return replace(alike, p_equivalence=equal)
@@ -318,7 +332,8 @@ def _signed_biserial(differences: Floats) -> float:
     return float((ranks[changed > 0].sum() - ranks[changed < 0].sum()) / ranks.sum())
 
 
-def _rank_sum(first: str, second: str, a: Floats, b: Floats, bounds: Bounds) -> RankPair:
+def _rank_sum(first: str, second: str, given: Floats, other: Floats, places: int, bounds: Bounds) -> RankPair:
+    a, b = np.round(given, places), np.round(other, places)
     statistic, p, exact = _mann_whitney(a, b)
     low, high = _interval([a, b], lambda drawn: _biserial(drawn[0], drawn[1]))
     return RankPair(
@@ -333,7 +348,10 @@ def _rank_sum(first: str, second: str, a: Floats, b: Floats, bounds: Bounds) -> 
         _biserial(a, b),
         low,
         high,
-        p_equivalence=_equivalent(bounds, lambda bound, side: _mann_whitney(a - bound, b, side)[1]),
+        # Rounded after the shift, which brings new rounding errors.
+        p_equivalence=_equivalent(
+            bounds, lambda bound, side: _mann_whitney(np.round(given - bound, places), b, side)[1]
+        ),
     )
 
 

@@ -1,6 +1,6 @@
 """Tables of `analysis ranks` and `analysis t-test`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from analysis.ranks import RankAnalysis
 from analysis.report.contents import caption, mark_name
@@ -36,7 +36,10 @@ def levels_table(result: RankAnalysis, name: str, synthetic: bool = False) -> Ta
     )
     header = (result.factor or "", "n", "Median", "Mean rank", "χ²", "df", "p", "Effect")
     bounds = share_interval((test.effect_low, test.effect_high))
-    notes = (f"{test.name} test, corrected for ties. Effect: {EFFECTS[test.name]}, 95% CI {bounds}.",)
+    notes = (
+        f"{test.name} test, corrected for ties. Effect: {EFFECTS[test.name]}, 95% CI {bounds}.",
+        *_note_of_no_width([(test.effect_low, test.effect_high)]),
+    )
     return Table("ranks", caption(f"{test.name} test", name, synthetic), header, rows, 1, notes)
 
 
@@ -93,6 +96,7 @@ def pairs_table(result: RankAnalysis, name: str, synthetic: bool = False) -> Tab
     notes = [
         f"{test} tests. r: rank-biserial correlation, positive if the first level is higher; interval over "
         "resampled participants.",
+        *_note_of_no_width([(pair.r_low, pair.r_high) for pair in result.pairs]),
         *_equivalence_note(bounds),
     ]
     if approximate:
@@ -178,6 +182,16 @@ def _equivalence_note(bounds: tuple[float, float] | None) -> tuple[str, ...]:
     if bounds is None:
         return ()
     return (f"TOST: two one-sided tests; below .05 the difference is inside {as_given(bounds)}.",)
+
+
+def _note_of_no_width(intervals: Sequence[tuple[float, float]]) -> tuple[str, ...]:
+    # All participants agree, and so does every draw of them.
+    if all(low < high for low, high in intervals):
+        return ()
+    return (
+        "An interval without width does not show certainty: all participants of this sample agree, so "
+        "resampling cannot vary. The population's effect may be smaller.",
+    )
 
 
 def _or_dash(form: Callable[[float], str], value: float | None) -> str:

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.ranks import rank_between, rank_within
+from analysis.ranks import rank_against, rank_between, rank_within
+from analysis.report.rank_tables import levels_table, pairs_table
 from experiments.errors import InputError
 from tests.conftest import REPOSITORY
 
@@ -66,6 +67,69 @@ def test_ranks_do_not_change_with_a_monotone_scale(rows: list[tuple[int, int, in
     assert one.test.chi2 == pytest.approx(other.test.chi2)
     assert 0 <= one.test.effect <= 1 + 1e-12
     assert one.mean_ranks == pytest.approx(other.mean_ranks)
+
+
+SUMS = [
+    [10, 10, 13],
+    [7, 5, 11],
+    [15, 14, 20],
+    [5, 6, 8],
+    [16, 17, 16],
+    [4, 7, 10],
+    [17, 17, 18],
+    [8, 7, 11],
+    [7, 8, 7],
+    [15, 14, 16],
+    [13, 16, 20],
+    [14, 10, 12],
+    [5, 6, 9],
+    [11, 13, 17],
+]
+"""Sums of three ratings of each participant at three levels."""
+
+
+def test_means_of_trials_are_tied_in_spite_of_rounding() -> None:
+    means = np.array(SUMS) / 3
+    pairs = rank_within("face", ["a", "b", "c"], means).pairs
+    # wilcox.test(y[, 1], y[, 2], paired = TRUE, digits.rank = 7) of R 4.2.2; without digits.rank R has
+    # V = 28.5, p = .431 for the first pair, as 13/3 - 4 and 7/3 - 2 differ in the last bit.
+    assert [pair.statistic for pair in pairs] == [32.5, 3, 4]
+    assert [pair.p_value for pair in pairs] == pytest.approx([0.6301303, 0.005232232, 0.002478385], rel=1e-6)
+    sums = rank_within("face", ["a", "b", "c"], np.array(SUMS, dtype=float)).pairs
+    assert [(pair.p_value, pair.r) for pair in pairs] == [(pair.p_value, pair.r) for pair in sums]
+
+
+def test_shifted_means_and_means_against_a_value_are_tied_in_spite_of_rounding() -> None:
+    sums = np.array(SUMS, dtype=float)
+    bounds = (-1 / 3, 1 / 3)
+    for one, other in (
+        (
+            rank_against(None, ["all"], [sums[:, 0] / 3], 10 / 3),
+            rank_against(None, ["all"], [sums[:, 0]], 10),
+        ),
+        (
+            rank_between("group", ["a", "b"], [sums[:, 0] / 3, sums[:, 2] / 3], bounds),
+            rank_between("group", ["a", "b"], [sums[:, 0], sums[:, 2]], (-1.0, 1.0)),
+        ),
+        (
+            rank_within("face", ["a", "b"], sums[:, :2] / 3, bounds),
+            rank_within("face", ["a", "b"], sums[:, :2], (-1.0, 1.0)),
+        ),
+    ):
+        assert one.pairs[0].statistic == other.pairs[0].statistic
+        assert one.pairs[0].p_value == pytest.approx(other.pairs[0].p_value)
+        assert one.pairs[0].p_equivalence == pytest.approx(other.pairs[0].p_equivalence)
+    with pytest.raises(InputError, match="there is nothing to rank"):
+        rank_against(None, ["all"], [np.array([0.1 + 0.2, 0.3])], 0.3)
+
+
+def test_an_interval_without_width_is_explained() -> None:
+    ordered = np.array([[1.0, 2.0, 3.0]] * 6) + np.arange(6)[:, None] * 10
+    agreed = rank_within("face", ["a", "b", "c"], ordered)
+    varied = rank_within("face", ["a", "b", "c"], np.array(SUMS, dtype=float))
+    for table in (levels_table, pairs_table):
+        assert "An interval without width does not show certainty" in " ".join(table(agreed, "x").notes)
+        assert "without width" not in " ".join(table(varied, "x").notes)
 
 
 def test_nothing_to_rank_is_refused() -> None:
