@@ -3,6 +3,7 @@
 import sys
 from dataclasses import asdict
 from enum import StrEnum
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -57,11 +58,14 @@ def effects_in(given: list[str]) -> dict[str, float]:
     sizes: dict[str, float] = {}
     for text in given:
         name, _, size = text.partition("=")
+        effect = ":".join(part.strip() for part in name.split(":"))
+        if effect in sizes:
+            raise InputError(f"--effect: {effect} has two sizes; give it once")
         try:
-            sizes[name.strip()] = float(size)
+            sizes[effect] = float(size)
         except ValueError:
             raise InputError(f"--effect should be like face=0.25 or face:group=0.1, got '{text}'") from None
-        if not 0 <= sizes[name.strip()] < 10:
+        if not 0 <= sizes[effect] < 10:
             raise InputError(
                 f"--effect takes Cohen's f from 0 (small .1, medium .25, large .4), got '{text}'"
             )
@@ -71,9 +75,20 @@ def effects_in(given: list[str]) -> dict[str, float]:
 def numbers_in(text: str, option: str) -> tuple[float, ...]:
     """Numbers separated by commas."""
     try:
-        return tuple(float(part) for part in names_in(text))
+        numbers = tuple(float(part) for part in names_in(text))
     except ValueError:
-        raise InputError(f"{option} should be numbers separated by commas, got '{text}'") from None
+        numbers = (float("nan"),)
+    # float() also reads nan and inf.
+    if not all(map(isfinite, numbers)):
+        raise InputError(f"{option} should be numbers separated by commas, got '{text}'")
+    return numbers
+
+
+def refuse_infinite(**options: float) -> None:
+    """Refuse options that are not finite numbers, such as nan; named as in the function's arguments."""
+    for name, value in options.items():
+        if not isfinite(value):
+            raise InputError(f"--{name.replace('_', '-')}: expected a number, got '{value:g}'")
 
 
 def counts_in(text: str, option: str) -> tuple[int, ...]:
@@ -163,6 +178,7 @@ def pairs(
     """
     from analysis.power.choices import PairsDesign
 
+    refuse_infinite(sd_rater=sd_rater)
     design = PairsDesign(numbers_in(abilities, "--abilities"), repeats, sd_rater, tie)
     simulate(design, "paired comparisons", (n, simulations, alpha, target, seed), plot, json)
     _warn_of_likeness("--sd-rater", sd_rater)
@@ -205,6 +221,10 @@ def thresholds(
     """
     from analysis.power.choices import ThresholdDesign
 
+    refuse_infinite(
+        threshold=threshold, difference=difference, spread=spread, sd_people=sd_people,
+        sd_difference=sd_difference, guess=guess, lapse=lapse,
+    )  # fmt: skip
     design = ThresholdDesign(
         numbers_in(levels, "--levels"), trials, threshold, difference, sd_people, sd_difference, spread,
         guess, lapse, function.value, seed,
@@ -321,6 +341,10 @@ def mixed(
     """
     from analysis.power.models import MixedDesign, Spreads
 
+    refuse_infinite(
+        sd_participant=sd_participant, sd_slope=sd_slope, sd_clip=sd_clip, sd_face=sd_face,
+        sd_face_slope=sd_face_slope, sd_residual=sd_residual,
+    )  # fmt: skip
     spreads = Spreads(sd_participant, sd_slope, sd_clip, sd_face, sd_face_slope, sd_residual)
     design = MixedDesign(
         numbers_in(difference, "--difference"),
@@ -381,6 +405,7 @@ def ordinal(
     """
     from analysis.power.models import OrdinalDesign
 
+    refuse_infinite(sd_participant=sd_participant, sd_slope=sd_slope, sd_clip=sd_clip)
     design = OrdinalDesign(
         numbers_in(difference, "--difference"),
         numbers_in(shares, "--shares"),

@@ -60,7 +60,7 @@ def power(
         str | None,
         typer.Option(help="Scale of the ratings, if there are several. Default: the first."),
     ] = None,
-    target: Annotated[float, typer.Option("--wanted", help="Target power.")] = 0.8,
+    target: Annotated[float, typer.Option("--wanted", help="Target power.", min=0.01, max=0.999)] = 0.8,
     seed: Annotated[int, typer.Option(help="Random seed; the same seed gives the same numbers.", min=0)] = 1,
     mean: MeanOption = None,
     effect: EffectOption = None,

@@ -255,7 +255,17 @@ class ThresholdDesign:
             f"functions with spread {self.spread:g}, guess rate {self.guess:g}, lapse rate {self.lapse:g}; "
             f"{self.trials} trials at each of {len(self.levels)} stimuli from {min(self.levels):g} to "
             f"{max(self.levels):g} in either condition; data sets draw from {POOL} simulated people"
+            f"{self._left_out}"
         )
+
+    @property
+    def _left_out(self) -> str:
+        share = 1 - float(np.isfinite(self.differences).mean())
+        if share == 0:
+            return ""
+        # Less than half a percent is not none.
+        said = "less than 1%" if share < 0.005 else f"{share:.0%}"
+        return f", of whom {said} are left out because a threshold cannot be fitted to these stimuli"
 
     @cached_property
     def differences(self) -> Floats:

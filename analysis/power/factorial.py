@@ -58,12 +58,7 @@ class FactorialDesign:
             raise InputError("a factor is named both within and between participants; remove it from one")
         if not self.sizes:
             raise InputError("no effect has a size; name one with --effect, such as face=0.25")
-        for effect in self.sizes:
-            for name in effect.split(":"):
-                if name not in levels:
-                    raise InputError(
-                        f"--effect: there is no factor '{name}'{did_you_mean(name, list(levels))}"
-                    )
+        self._refuse_odd_effects(list(levels))
         if any(size < 2 for size in levels.values()):
             raise InputError("expected at least 2 levels of every factor")
         if not -1 < self.covariate < 1:
@@ -71,6 +66,19 @@ class FactorialDesign:
         k = int(np.prod(list(self.within.values()), dtype=np.int64))
         if not -1 / max(k - 1, 1) < self.correlation < 1:
             raise InputError(f"{k} cells cannot all correlate {self.correlation:g} with each other")
+
+    def _refuse_odd_effects(self, factors: list[str]) -> None:
+        known: dict[frozenset[str], str] = {}
+        for effect in self.sizes:
+            names = effect.split(":")
+            for name in names:
+                if name not in factors:
+                    raise InputError(f"--effect: there is no factor '{name}'{did_you_mean(name, factors)}")
+            if len(set(names)) < len(names):
+                raise InputError(f"--effect: '{effect}' names a factor twice; an effect names each once")
+            # Both would be added up to one larger effect.
+            if (same := known.setdefault(frozenset(names), effect)) != effect:
+                raise InputError(f"--effect: '{same}' and '{effect}' are the same effect; give it once")
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -122,7 +130,12 @@ class FactorialDesign:
         return total.reshape(groups, -1)
 
     def p_values(self, n: int, rng: np.random.Generator) -> Sequence[float]:
-        """The p of each effect in one data set; participants are dealt to groups in turn."""
+        """The p of each effect in one data set; participants are dealt to groups in turn.
+
+        NaN where there are no more participants than groups (and covariates), which leaves no error.
+        """
+        if n <= len(self.means) + (self.covariate != 0):
+            return [np.nan] * len(self.sizes)
         group = np.arange(n) % len(self.means)
         noise = rng.normal(size=(n, self.means.shape[1]))
         shared = noise.mean(axis=1, keepdims=True)

@@ -30,6 +30,14 @@ def refuse_no_difference(differences: Sequence[float]) -> None:
         )
 
 
+def confounded(clips: int) -> str:
+    """Why as many clips as conditions allow no test."""
+    return (
+        f"{clips} clips are one per condition, so clip and condition are confounded. Use {2 * clips} clips "
+        "or more, or add --crossed if each clip is shown in every condition"
+    )
+
+
 def said_of_differences(differences: Sequence[float]) -> str:
     """The conditions in words, without a unit."""
     if len(differences) == 1:
@@ -107,10 +115,7 @@ class MixedDesign:
                     f"multiple of {max(cell, 2)}"
                 )
             if not self.faces and clips == cell:
-                raise InputError(
-                    f"{clips} clips are one per condition, so clip and condition are confounded. Use "
-                    f"{2 * cell} clips or more, or add --crossed if each clip is shown in every condition"
-                )
+                raise InputError(confounded(clips))
         if self.faces and min(self.faces) < 2:
             raise InputError("expected at least two faces; omit --faces for a study of one face")
 
@@ -261,6 +266,8 @@ class OrdinalDesign:
                 f"{self.clips} clips cannot be divided evenly between {self.conditions} conditions; use a "
                 f"multiple of {self.conditions}, or add --crossed"
             )
+        if not self.crossed and self.clips == self.conditions:
+            raise InputError(confounded(self.clips))
 
     @property
     def conditions(self) -> int:

@@ -232,11 +232,11 @@ def sample_size_text(result: PowerResult, design: Design, target: float, version
     for effect, row, errors in zip(result.effects, result.power, result.se, strict=True):
         n = smallest[effect]
         if n is None:
-            # All NaN: no sample size allows the test.
-            best = float(np.nanmax(row)) if not np.isnan(row).all() else float("nan")
-            said.append(
-                f"{effect}: not reached with up to {result.n[-1]} participants (maximum power {best:.2f})"
-            )
+            # All NaN: no data set of any size allows the test.
+            why = "no data set allowed the test"
+            if not np.isnan(row).all():
+                why = f"maximum power {float(np.nanmax(row)):.2f}"
+            said.append(f"{effect}: not reached with up to {result.n[-1]} participants ({why})")
         else:
             at = result.n.index(n)
             said.append(f"{effect}: N = {n} (power {row[at]:.2f}, simulation error {errors[at]:.3f})")

@@ -246,6 +246,29 @@ def test_the_text_names_population_seed_and_numbers() -> None:
     assert "not reached" in sample_size_text(simulate_design(design, "x", [4], 40), design, 0.99, "1.2")
 
 
+@pytest.mark.parametrize("covariate", [0.0, 0.5])
+def test_sizes_that_leave_no_error_have_no_power(covariate) -> None:
+    design = FactorialDesign({}, {"group": 4}, {"group": 0.4}, covariate=covariate)
+    least = 6 if covariate else 5
+    result = simulate_design(design, "x", [3, least - 1, least], 20)
+    assert np.isnan(result.power[0]).tolist() == [True, True, False]
+    text = sample_size_text(simulate_design(design, "x", [4], 20), design, 0.8, "1.2")
+    assert "not reached with up to 4 participants (no data set allowed the test)" in text
+
+
+def test_the_text_says_how_many_people_have_no_threshold(monkeypatch) -> None:
+    monkeypatch.setattr(choices, "POOL", 100)
+    inside = ThresholdDesign((100, 120, 140, 160, 180), 10, 140, 5, 5, 2, 12)
+    assert "left out" not in inside.population
+    above = ThresholdDesign((100, 120, 140), 10, 170, 5, 15, 10, 12)
+    share = 1 - np.isfinite(above.differences).mean()
+    assert 0.2 < share < 1
+    assert (
+        f"100 simulated people, of whom {share:.0%} are left out because a threshold cannot be fitted"
+        in above.population
+    )
+
+
 def test_the_same_seed_gives_the_same_numbers_whatever_the_other_sizes() -> None:
     design = PairsDesign((0.0, 0.4, 0.8))
     alone = simulate_design(design, "x", [12], 30, seed=6)
@@ -274,7 +297,7 @@ def call(capsys, monkeypatch, tmp_path):
         "mixed --difference 0.5 --clips 4 --faces 2",
         "ordinal --difference 0.5 --shares 1,2,1 --clips 2 --crossed",
         "mixed --difference 0.3,0.6 --clips 6",
-        "ordinal --difference 0.3,0.6 --shares 1,2,1 --clips 3",
+        "ordinal --difference 0.3,0.6 --shares 1,2,1 --clips 6",
         "pairs --abilities 0,0.3,0.6 --sd-rater 0.4 --tie 0.2",
         "thresholds --levels 100,120,140 --threshold 120 --difference 10 --spread 10 --sd-difference 4",
     ],
@@ -305,7 +328,21 @@ def test_the_commands_write_table_text_figure_and_json(call, tmp_path, monkeypat
         ("mixed --difference 0.2,0.4 --clips 8", "in 3 conditions; expected a multiple of 3"),
         ("ordinal --difference 0.2,0.4 --shares 1,1 --clips 8", "between 3 conditions; use a multiple of 3"),
         ("mixed --difference ,", "power cannot be computed: no condition is compared; add --difference"),
-        ("mixed --difference nan", "power cannot be computed: no condition is compared; add --difference"),
+        ("mixed --difference nan", "--difference should be numbers separated by commas, got 'nan'"),
+        ("mixed --difference 0.5 --sd-slope inf", "--sd-slope: expected a number, got 'inf'"),
+        ("ordinal --difference 0.5 --shares 1,nan", "--shares should be numbers separated by commas"),
+        ("ordinal --difference 0.5 --shares 1,1 --clips 2", "2 clips are one per condition"),
+        ("pairs --abilities 0,inf", "--abilities should be numbers separated by commas, got '0,inf'"),
+        (
+            "thresholds --levels 1,2 --threshold nan --difference 1 --spread 1",
+            "--threshold: expected a number, got 'nan'",
+        ),
+        (
+            "anova --within face:2,blur:2 --effect face:blur=0.2 --effect blur:face=0.3",
+            "'face:blur' and 'blur:face' are the same effect; give it once",
+        ),
+        ("anova --within face:2 --effect face=0.2 --effect face=0.3", "face has two sizes; give it once"),
+        ("anova --within face:2 --effect face:face=0.2", "'face:face' names a factor twice"),
         ("ordinal --difference 0.5 --shares 1,a", "numbers separated by commas"),
         ("anova --within face:3 --effect face=0.2 --covariate 1", "between -1 and 1"),
         ("pairs --abilities 0,1 --tie 1", "probability of ties"),
