@@ -1,13 +1,11 @@
 """Many requests of experimenters at once wait for one another; raters wait for none of them."""
 
 import asyncio
-from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
-import pytest
-
 from server.request_limits import ConcurrencyLimit
+from tests.helpers.waiting import run_in_own_loop
 
 PAGE = "/api/admin/studies"
 
@@ -43,13 +41,7 @@ async def _settled() -> None:
         await asyncio.sleep(0)
 
 
-@pytest.fixture
-def loop() -> Iterator[asyncio.Runner]:
-    with asyncio.Runner() as runner:
-        yield runner
-
-
-def test_two_are_served_and_the_third_waits_until_an_answer_begins(loop: asyncio.Runner) -> None:
+def test_two_are_served_and_the_third_waits_until_an_answer_begins() -> None:
     async def go() -> None:
         pages = Pages()
         limit = ConcurrencyLimit(pages, at_once=2)
@@ -62,10 +54,10 @@ def test_two_are_served_and_the_third_waits_until_an_answer_begins(loop: asyncio
         pages.ends.set()
         await asyncio.gather(*tasks)
 
-    loop.run(go())
+    run_in_own_loop(go())
 
 
-def test_a_request_that_breaks_or_is_given_up_leaves_its_place(loop: asyncio.Runner) -> None:
+def test_a_request_that_breaks_or_is_given_up_leaves_its_place() -> None:
     async def go() -> None:
         pages = Pages()
         pages.breaks = True
@@ -80,4 +72,4 @@ def test_a_request_that_breaks_or_is_given_up_leaves_its_place(loop: asyncio.Run
         pages.ends.set()
         await asyncio.wait_for(_asked(limit, PAGE)[0], 5)
 
-    loop.run(go())
+    run_in_own_loop(go())
