@@ -35,7 +35,9 @@ VerifyOption = Annotated[
 LevelsOption = Annotated[
     list[str] | None,
     typer.Option(
-        help="Order of a factor's levels: time=before,after. Repeatable. Default: by name, numbers by value."
+        help="Order of a factor's levels: time=before,after; or an experiment (exp1 to exp3, a demo, a TOML "
+        "file), for its declared order, as in `analysis run`. Repeatable. Default: alphabetical, numbers by "
+        "value."
     ),
 ]
 JsonOption = Annotated[

@@ -178,7 +178,8 @@ def left_out(exclusions: "Exclusions") -> tuple[str, ...]:
     ]
     if not lines:
         people = int(exclusions.rows["participant"].nunique())
-        lines = [f"No analyzed trial was excluded (of {counted(people, 'participant')})"]
+        # A participant without ratings in a cell may still be excluded: the decisions name that one.
+        lines = [f"No trial was excluded by rule or manually (of {counted(people, 'participant')})"]
         if exclusions.set_aside:
             *others, last = exclusions.set_aside
             named = f"{', '.join(others)} and {last}" if others else last

@@ -73,7 +73,8 @@ def in_given_order(rows: pd.DataFrame, given: Sequence[str]) -> tuple[pd.DataFra
     rows : DataFrame
         Columns of text.
     given : sequence of str
-        `column=first,second,third`, or with `|` between levels that hold a comma.
+        `column=first,second,third`, or with `|` between levels that hold a comma; or the name or path of an
+        experiment, for the declared order of each of its factors that is a column.
 
     Raises
     ------
@@ -107,13 +108,16 @@ def given_orders(
         As `in_given_order`.
     """
     orders: dict[str, tuple[str, ...]] = {}
-    for text in given:
+    for text in (order for one in given for order in _listed_orders(one, levels)):
         name, equals, listed = text.partition("=")
         name = name.strip()
         # A bar where levels hold commas.
         order = [level.strip() for level in listed.split("|" if "|" in listed else ",")]
         if not equals or not all(order):
-            raise InputError(f"--levels should be like time=before,after,later, got '{text}'")
+            raise InputError(
+                f"--levels should be like time=before,after,later, or an experiment's name or TOML file, "
+                f"got '{text}'"
+            )
         if name not in levels:
             raise InputError(f"--levels: no factor is called '{name}'{did_you_mean(name, levels)}")
         there = natural_order(list(dict.fromkeys(levels[name])))
@@ -131,6 +135,32 @@ def given_orders(
     return orders, tuple(
         f"levels of '{name}' in the order given: {', '.join(order)}" for name, order in orders.items()
     )
+
+
+def _listed_orders(text: str, levels: Mapping[str, Sequence[str]]) -> list[str]:
+    """The text, or where it is an experiment its declared order of each factor among `levels`."""
+    if "=" in text:
+        return [text]
+    from experiments.load import UnknownExperimentError, load_experiment
+
+    try:
+        experiment = load_experiment(text, has_data=True)
+    except UnknownExperimentError:
+        return [text]
+    factors = [factor for factor in experiment.factors if factor.name in levels]
+    if not factors:
+        names = ", ".join(experiment.factor_names) or "no factors"
+        raise InputError(f"--levels: none of the factors of {text} is a factor here; it declares {names}")
+    orders = []
+    for factor in factors:
+        there = set(levels[factor.name])
+        declared = [level.name for level in factor.levels]
+        if unknown := sorted(there - set(declared)):
+            raise InputError(
+                f"--levels: '{unknown[0]}' is a level of '{factor.name}' here, but {text} does not declare it"
+            )
+        orders.append(f"{factor.name}={'|'.join(level for level in declared if level in there)}")
+    return orders
 
 
 def _in_order(column: pd.Series, texts: Sequence[str]) -> list[str]:

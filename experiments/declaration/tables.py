@@ -176,7 +176,7 @@ class Display(Declaration):
     minimum_height_px: Annotated[int, Field(ge=0)] = 500
     """Minimum window height for starting a run, in CSS pixels."""
     allow_touch: bool = True
-    """Allows phones and tablets (devices with a touch screen and no mouse). Off: they are turned away."""
+    """Allows phones and tablets (devices with a touch screen and no mouse). Off: they cannot be used."""
     sync_patch: bool = False
     """Draws a square in the lower left corner of the clip that encodes the frame number. A photodiode or a
     phone camera can read it (`stimuli scope`). Use it to measure a setup, not with participants."""
@@ -187,16 +187,16 @@ class Display(Declaration):
         needed = (self.minimum_width_px, self.minimum_height_px)
         if not self.allow_touch:
             return (
-                "Phones and tablets are turned away: devices with a touch screen and no mouse are not "
-                "allowed."
+                "Phones and tablets cannot be used: the study does not allow devices with a touch screen and "
+                "no mouse."
             )
         if any(needed[0] <= width and needed[1] <= height for width, height in PHONE_PX):
             return ""
         (width, height), _ = PHONE_PX
         return (
-            f"Phones are turned away: the study requires a window of at least {needed[0]} x {needed[1]} "
-            f"px, and a phone has about {width} x {height}. To change the minimum width and height, see "
-            f"Screen and playback."
+            f"Phones cannot be used: the study needs a window of at least {needed[0]} x {needed[1]} px, and "
+            f"a phone has about {width} x {height}. To change the minimum width and height, see Screen and "
+            f"playback."
         )
 
 

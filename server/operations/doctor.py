@@ -341,11 +341,11 @@ def counts(services: Services) -> Iterator[Finding]:
         yield Finding(
             "counts",
             "failed",
-            f"of {wrong} of {counted(compared.runs, 'run')} differ from their ratings",
+            f"the stored counts of {wrong} of {counted(compared.runs, 'run')} differ from their ratings",
             advice,
         )
     else:
-        yield Finding("counts", "ok", f"of {counted(compared.runs, 'run')}, as their ratings")
+        yield Finding("counts", "ok", f"stored counts match the ratings in {counted(compared.runs, 'run')}")
 
 
 def identities(services: Services) -> Iterator[Finding]:

@@ -49,9 +49,9 @@ def simulate(
     observer: Annotated[
         str,
         typer.Option(
-            help="In a study of thresholds, the true function: threshold=200,spread=30,sd=10,guess=0.02,"
-            "lapse=0.02 (sd is that of people's thresholds), with a second factor tilt=50 too. Omitted "
-            "values are typical for the stimuli."
+            help="In a study of thresholds, the true function, for example threshold=200,spread=30. Keys: "
+            "threshold, spread, sd (of people's thresholds), guess, lapse and, with a second factor, tilt. "
+            "Omitted values are typical for the stimuli."
         ),
     ] = "",
     json_file: Annotated[

@@ -256,8 +256,8 @@ def _ways_visits_ended(of: DescribedSeries) -> list[str]:
         "withdrew": "{withdrew} {withdrew:was|were} withdrawn by the participant",
         "screened_out": "{screened_out} {screened_out:was|were} screened out",
         "restarted": "{restarted} {restarted:was|were} replaced by a new visit of the same participant",
-        "unfinished": "{unfinished} {unfinished:was|were} not finished"
-        + (" or still under way" if of.is_open else ""),
+        "unfinished": "{unfinished} {unfinished:was|were} "
+        + ("unfinished or still in progress" if of.is_open else "not finished"),
     }
     ends = [words for name, words in ways.items() if of.value(name)]
     if not ends:

@@ -368,7 +368,7 @@ def _tried(launch: LaunchState) -> Iterator[LaunchCheck]:
     if not launch.is_tried:
         text = (
             f"Nobody has completed version {launch.version.number} yet, not even as a preview. "
-            "Go through it once as a participant."
+            "Complete it once as a participant; preview answers do not count."
         )
         yield LaunchCheck(kind="not_tried", blocks=False, text=text, page="preview")
 

@@ -2,12 +2,14 @@
 
 import re
 import shlex
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from typer.main import get_command
+from typer.testing import CliRunner
 
 from analysis.cli import app as analysis
 from palpebra.cli import app as palpebra
@@ -16,12 +18,8 @@ from server.cli import app as server
 from stimuli_builder.cli import app as stimuli
 from tests.conftest import REPOSITORY
 
-PROGRAMS = {
-    "stimuli": get_command(stimuli),
-    "server": get_command(server),
-    "analysis": get_command(analysis),
-    "palpebra": get_command(palpebra),
-}
+APPS = {"stimuli": stimuli, "server": server, "analysis": analysis, "palpebra": palpebra}
+PROGRAMS = {program: get_command(app) for program, app in APPS.items()}
 PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 BLOCK = re.compile(r"^[ ]*```([^\n`]*)\n(.*?)^[ ]*```[ ]*$", re.MULTILINE | re.DOTALL)
 SHELL = {"", "sh", "text", "console"}
@@ -146,3 +144,21 @@ def test_a_wrong_option_is_found() -> None:
     assert fault_of("stimuli blink x.csv") == "no command 'blink'"
     assert fault_of("server workspace member vision anna editor") == "member: too many arguments: editor"
     assert len([line for page in PAGES for line in command_lines(page.read_text(encoding="utf-8"))]) > 150
+
+
+def leaf_commands(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[Any, tuple[str, ...]]]:
+    inner = getattr(command, "commands", None)
+    if not inner:
+        yield command, path
+    for name, one in (inner or {}).items():
+        yield from leaf_commands(one, (*path, name))
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_help_breaks_lines_between_words_only(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A word longer than the column of its option is cut in the middle: `thr eshold=200`."""
+    monkeypatch.setenv("COLUMNS", "80")
+    for command, path in leaf_commands(PROGRAMS[program]):
+        shown = CliRunner().invoke(APPS[program], [*path, "--help"]).output
+        words = [word for option in command.params for word in (getattr(option, "help", "") or "").split()]
+        assert [word for word in words if word not in shown] == [], path

@@ -12,6 +12,6 @@ def test_a_study_that_a_phone_can_show_turns_none_away(width: int, height: int) 
 
 def test_a_window_larger_than_a_phone_is_said_with_its_size() -> None:
     assert Display().turned_away.startswith(
-        "Phones are turned away: the study requires a window of at least 800 x 500 px"
+        "Phones cannot be used: the study needs a window of at least 800 x 500 px"
     )
     assert "tablets" in Display(allow_touch=False, minimum_width_px=0).turned_away

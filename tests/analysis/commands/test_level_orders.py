@@ -10,6 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
+from experiments.load import load_experiment
+from tests.analysis.ratings_file import rows_of, simulate, write_export
 
 ORDER = ("low", "mid", "high")
 FACTORS = pd.DataFrame({"item": ORDER, "kind": ["x", "y", "y"]})
@@ -86,6 +88,39 @@ def test_levels_come_in_the_order_given(command: str, tmp_path: Path) -> None:
 )
 def test_other_orders_are_refused(command: str, levels: str, words: str, tmp_path: Path) -> None:
     done = run(command, tmp_path, "--levels", levels.format(COMMANDS[command][2]))
+    assert done.exit_code != 0
+    assert words in " ".join((done.output + str(done.exception)).split()).lower()
+
+
+def test_a_declaration_gives_the_order_of_its_factors(tmp_path: Path) -> None:
+    """As `analysis run` prints them; the statistics are those of any order."""
+    declared = load_experiment("exp3")
+    export = write_export(tmp_path / "r.csv", declared, rows_of(declared, simulate(declared, 8)))
+    words = ["anova", str(export), "--participant", "participant", "--rating", "response"]
+    words += ["--within", "lower_lid"]
+    results = []
+    for number, further in enumerate(([], ["--levels", "exp3"])):
+        target = tmp_path / f"{number}.json"
+        done = CliRunner().invoke(app, [*words, *further, "--json", str(target)])
+        assert done.exit_code == 0, done.output
+        results.append(json.loads(target.read_text()))
+    names = [level.name for level in declared.factor("lower_lid").levels]
+    orders = [[mean["levels"]["lower_lid"] for mean in result["marginal_means"]] for result in results]
+    assert orders == [sorted(names), names]
+    assert sorted(names) != names
+    first, second = (result["effects"][0]["univariate"] for result in results)
+    assert first == pytest.approx(second)
+
+
+@pytest.mark.parametrize(
+    ("levels", "words"),
+    [
+        ("exp3", "none of the factors of exp3 is a factor here; it declares lower_lid"),
+        ("nothing", "or an experiment's name or toml file, got 'nothing'"),
+    ],
+)
+def test_an_experiment_without_these_factors_is_refused(levels: str, words: str, tmp_path: Path) -> None:
+    done = run("pairs", tmp_path, "--levels", levels)
     assert done.exit_code != 0
     assert words in " ".join((done.output + str(done.exception)).split()).lower()
 

@@ -42,7 +42,7 @@ def test_means_are_the_ratings_own(tmp_path, rows) -> None:
     assert analysis.anova.y == pytest.approx(ratings.mean(axis=-1))
     assert analysis.anova.factors == ("lower_lid",)
     assert analysis.synthetic
-    assert left_out(analysis.exclusions) == ("No analyzed trial was excluded (of 8 participants)",)
+    assert left_out(analysis.exclusions) == ("No trial was excluded by rule or manually (of 8 participants)",)
 
 
 def test_export_and_database_give_the_same_numbers(tmp_path, rows) -> None:
@@ -132,7 +132,9 @@ def test_a_run_without_a_rating_does_not_take_the_place_of_one_with_ratings(tmp_
     assert analysis.anova.y.shape == (8, 4)
     assert analysis.exclusions.runs == ()
     said = left_out(analysis.exclusions)
-    assert said == ("No analyzed trial was excluded (of 8 participants); 1 practice trial was set aside",)
+    assert said == (
+        "No trial was excluded by rule or manually (of 8 participants); 1 practice trial was set aside",
+    )
 
 
 @pytest.mark.parametrize("words", [("1.0", "0.0"), ("TRUE", "FALSE"), ("yes", "")])
@@ -197,6 +199,14 @@ def test_a_trial_rule_drops_trials_and_counts_them(tmp_path, rows, rule, values)
     assert any("4 to 5 ratings" in text for text in analysis.decisions)
 
 
+def test_a_participant_excluded_for_an_empty_cell_contradicts_no_sentence(tmp_path, rows) -> None:
+    first, cell = rows[0]["participant"], rows[0]["lower_lid"]
+    kept = [row for row in rows if (row["participant"], row["lower_lid"]) != (first, cell)]
+    analysis = analyse(tmp_path, kept, with_rules())
+    assert left_out(analysis.exclusions) == ("No trial was excluded by rule or manually (of 8 participants)",)
+    assert any(f"participant {first} excluded: no rating in" in said for said in analysis.decisions)
+
+
 def test_practice_pilot_and_unrated_rows_are_set_aside_and_said(tmp_path, rows) -> None:
     extra = [
         rows[0] | {"kind": "practice", "trial_index": 90},
@@ -206,8 +216,8 @@ def test_practice_pilot_and_unrated_rows_are_set_aside_and_said(tmp_path, rows) 
     analysis = analyse(tmp_path, rows + extra, pool=Pool(Origin.SIMULATED))
     assert "only responses of origin simulated were analyzed" in analysis.decisions
     assert left_out(analysis.exclusions) == (
-        "No analyzed trial was excluded (of 8 participants); 1 row of other origins, 1 practice trial and "
-        "1 presentation without a rating were set aside",
+        "No trial was excluded by rule or manually (of 8 participants); 1 row of other origins, "
+        "1 practice trial and 1 presentation without a rating were set aside",
     )
 
 

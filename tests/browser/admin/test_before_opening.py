@@ -89,8 +89,8 @@ def test_a_clip_that_nobody_can_see_is_named_on_every_page_of_its_study(
 
 def test_links_of_recruiters_are_offered_once_a_recruiter_is_set(dashboard: Dashboard, failing: str) -> None:
     page = dashboard.open("/studies/broken")
-    page.get_by_role("button", name="Close").click()
-    page.get_by_role("dialog").get_by_role("button", name="Close", exact=True).last.click()
+    page.get_by_role("button", name="Close study").click()
+    page.get_by_role("dialog").get_by_role("button", name="Close study").click()
     page.get_by_role("button", name="Set live").click()
     page.get_by_role("dialog").get_by_role("button", name="Set live").click()
     opened = page.get_by_role("dialog").filter(has_text="Participants can start")

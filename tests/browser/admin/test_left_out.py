@@ -24,13 +24,13 @@ def test_a_clip_chosen_by_mistake_is_left_out_and_what_was_typed_stays(
     panel = page.get_by_role("tabpanel", name="From your own clips")
     files = panel.locator('input[type="file"]').first
     files.set_input_files(videos[1:])
-    expect(panel.get_by_text("4 clips received")).to_be_visible(timeout=60_000)
+    expect(panel.get_by_text("4 clips uploaded")).to_be_visible(timeout=60_000)
     title = panel.get_by_label("Title of the study")
     title.fill("Ohne Probe")
 
-    panel.get_by_text("Each file: its conversion, and leaving it out").click()
+    panel.get_by_text("Review the files, or leave some out").click()
     panel.get_by_role("button", name="Leave out Probe.mp4").press("Enter")
-    expect(panel.get_by_text("3 clips received")).to_be_visible()
+    expect(panel.get_by_text("3 clips uploaded")).to_be_visible()
     expect(panel.get_by_role("status", name="Left out")).to_contain_text("Probe.mp4 is left out.")
     expect(panel.get_by_label("Pattern", exact=True)).to_have_value("{factor1}_{factor2}_1.mp4")
     expect(panel.get_by_role("region", name="Result for each file")).to_be_focused()
@@ -38,7 +38,7 @@ def test_a_clip_chosen_by_mistake_is_left_out_and_what_was_typed_stays(
     shoot(dashboard, "left-out")
 
     panel.get_by_role("button", name="Put back Probe.mp4").click()
-    expect(panel.get_by_text("4 clips received")).to_be_visible()
+    expect(panel.get_by_text("4 clips uploaded")).to_be_visible()
     expect(panel.get_by_role("button", name="Put back Probe.mp4")).to_have_count(0)
     panel.get_by_role("button", name="Leave out Probe.mp4").click()
     page.reload()  # what is left out stays so
@@ -48,7 +48,7 @@ def test_a_clip_chosen_by_mistake_is_left_out_and_what_was_typed_stays(
 
     title.fill("Ohne Probe")
     files.set_input_files(videos[:1])  # one that was forgotten
-    expect(panel.get_by_text("4 clips received")).to_be_visible(timeout=60_000)
+    expect(panel.get_by_text("4 clips uploaded")).to_be_visible(timeout=60_000)
     expect(title).to_have_value("Ohne Probe")
     panel.get_by_label("What are Ärm, Örm?").fill("Figur")
     panel.get_by_role("button", name="Create", exact=True).click()
@@ -68,7 +68,7 @@ def test_a_file_that_is_not_a_clip_keeps_no_other_from_coming(dashboard: Dashboa
     panel.locator('input[type="file"]').first.set_input_files(
         [videos[0], tmp_path / "poster.png", *videos[1:]]
     )
-    expect(panel.get_by_text("3 clips received")).to_be_visible(timeout=60_000)
+    expect(panel.get_by_text("3 clips uploaded")).to_be_visible(timeout=60_000)
     refused = panel.get_by_role("alert").filter(has_text="1 of the files left out")
     expect(refused).to_contain_text("'poster.png' is neither a video")
     panel.get_by_label("Title of the study").fill("Unfinished")
@@ -84,9 +84,9 @@ def test_all_clips_can_be_left_out_and_come_back(dashboard: Dashboard, tmp_path:
     panel = page.get_by_role("tabpanel", name="From your own clips")
     video = write_video(tmp_path / "a_1.mp4", "libx264", size_px=(320, 120))
     panel.locator('input[type="file"]').first.set_input_files(video)
-    panel.get_by_text("Each file: its conversion, and leaving it out").click(timeout=60_000)
+    panel.get_by_text("Review the files, or leave some out").click(timeout=60_000)
     panel.get_by_role("button", name="Leave out a_1.mp4").click(timeout=60_000)
-    expect(panel.get_by_text("0 clips received")).to_be_visible()
+    expect(panel.get_by_text("0 clips uploaded")).to_be_visible()
     expect(panel.get_by_text("Still needed: clips that have been looked into")).to_be_visible()
     panel.get_by_role("button", name="Put back a_1.mp4").click()
     expect(panel.get_by_text("1 clip received")).to_be_visible()

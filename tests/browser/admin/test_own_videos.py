@@ -54,18 +54,18 @@ def test_videos_of_any_format_become_a_study(
     corrected = tmp_path / "fast_4.mp4"
     corrected.write_bytes(next(path for path in videos if path.suffix == ".mp4").read_bytes())
     table.get_by_label("Replace fast_3.mp4 by").set_input_files(corrected)
-    expect(panel.get_by_text("5 clips received: 2 as uploaded, 3 converted")).to_be_visible(timeout=60_000)
+    expect(panel.get_by_text("5 clips uploaded: 2 unchanged, 3 converted")).to_be_visible(timeout=60_000)
     expect(table.get_by_text("fast_3.mp4")).to_have_count(0)
 
     panel.get_by_role("button", name="Start over").click()
     files.set_input_files(videos)
-    expect(panel.get_by_text("4 clips received: 1 as uploaded, 3 converted")).to_be_visible(timeout=60_000)
-    panel.get_by_text("Each file: its conversion, and leaving it out").click()
+    expect(panel.get_by_text("4 clips uploaded: 1 unchanged, 3 converted")).to_be_visible(timeout=60_000)
+    panel.get_by_text("Review the files, or leave some out").click()
     expect(table.get_by_text("encoded as H.264, was vp9")).to_be_visible()
     page.reload()  # what was sent is still there
     page.get_by_label("Short name").fill("mixed")
     page.get_by_role("tab", name="From your own clips").click()
-    expect(panel.get_by_text("4 clips received")).to_be_visible(timeout=60_000)
+    expect(panel.get_by_text("4 clips uploaded")).to_be_visible(timeout=60_000)
     panel.get_by_label("Pattern", exact=True).fill("{speed}_{exemplar}.mp4")
     panel.get_by_label("Title of the study").fill("Mixed formats")
     shoot(dashboard, "upload-converted")
@@ -108,7 +108,7 @@ def test_a_clip_that_the_participant_page_does_not_play_is_named_with_its_reason
     page.get_by_role("tab", name="From your own clips").click()
     panel = page.get_by_role("tabpanel", name="From your own clips")
     panel.locator('input[type="file"]').first.set_input_files(clips)
-    expect(panel.get_by_text("2 as uploaded, 1 unusable")).to_be_visible(timeout=60_000)
+    expect(panel.get_by_text("2 unchanged, 1 unusable")).to_be_visible(timeout=60_000)
     table = panel.get_by_role("region", name="Result for each file")
     expect(table.get_by_text("the participant's page does not play it in this browser")).to_have_count(1)
     expect(table.get_by_text("unsupported or unrecognizable format")).to_be_visible()
@@ -118,5 +118,5 @@ def test_a_clip_that_the_participant_page_does_not_play_is_named_with_its_reason
     expect(panel.get_by_role("button", name="Create")).to_be_disabled()
     assert axe_violations(page) == []
     table.get_by_label("Leave out odd_1.mp4").click()
-    expect(panel.get_by_text("2 clips received.")).to_be_visible(timeout=60_000)
+    expect(panel.get_by_text("2 clips uploaded.")).to_be_visible(timeout=60_000)
     expect(panel.get_by_role("button", name="Create")).to_be_enabled(timeout=60_000)

@@ -207,7 +207,7 @@ def test_a_notice_covers_neither_tabs_nor_a_dialog_on_a_phone(dashboard: Dashboa
     )
     try:
         dashboard.open("/studies/short/data").get_by_role("button", name="Create capsule").click()
-        page.get_by_role("button", name="Close", exact=True).click()
+        page.get_by_role("button", name="Close study").click()
         page.get_by_role("dialog").get_by_role("button", name="Cancel").wait_for()
         page.evaluate(WATCH_FOR_A_NOTICE)
         held[0].fulfill(

@@ -78,7 +78,7 @@ def test_the_counts_are_those_of_the_runs(
         in answer["paragraph"]
     )
     assert "No participant has completed" not in answer["paragraph"]
-    assert "and one was not finished or still under way" in answer["paragraph"]
+    assert "and one was unfinished or still in progress" in answer["paragraph"]
     study.change(status="closed")
     closed = viewer.get("/studies/short/methods").json()["paragraph"]
     assert "and one was not finished." in closed

@@ -101,7 +101,7 @@ function Rows({ files, frame, ...does }: RowProps & { files: Props["files"]; fra
 
 function OneFile({ file, onReplace, onLeaveOut }: RowProps & { file: Schemas["UploadedFile"] }) {
   const { state, source } = file;
-  const received = state === "waiting" ? "being checked" : "as uploaded";
+  const received = state === "waiting" ? "being checked" : "unchanged";
   const [colour, word] = state === "refused" ? ["red", "refused"] : source != null ? ["blue", "converted"] : ["gray", received];
   return (
     <Group justify="space-between" align="start" wrap="nowrap" gap="xs">

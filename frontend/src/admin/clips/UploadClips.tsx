@@ -145,8 +145,8 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
     <Stack gap="xs">
       <Group justify="space-between">
         <Text>
-          {count(files.length)} {files.length === 1 ? "clip" : "clips"} received
-          {!received.has_manifest && refused + changed > 0 && `: ${summary(files.length - refused - changed, changed, refused)}`}.
+          {count(files.length)} {files.length === 1 ? "clip" : "clips"} uploaded
+          {!received.has_manifest && refused + changed > 0 && summary(files.length - refused - changed, changed, refused)}.
         </Text>
         <Button size="compact-sm" variant="default" onClick={upload.forget}>
           Start over
@@ -197,7 +197,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
       ))}
       {!received.has_manifest && (
         <details open={isListed || refused > 0 || received.left_out.length > 0} onToggle={(event) => setListed(event.currentTarget.open)}>
-          <summary className="small-summary">Each file: its conversion, and leaving it out</summary>
+          <summary className="small-summary">Review the files, or leave some out</summary>
           <FileTable files={inOrder(files)} leftOut={received.left_out} upload={upload} />
         </details>
       )}
@@ -214,12 +214,13 @@ function inOrder(files: Schemas["UploadedFile"][]): Schemas["UploadedFile"][] {
 }
 
 function summary(shown: number, changed: number, refused: number): string {
+  if (shown + refused === 0) return changed === 1 ? " and converted" : ", all converted";
   const parts = [
-    shown > 0 && `${count(shown)} as uploaded`,
+    shown > 0 && `${count(shown)} unchanged`,
     changed > 0 && `${count(changed)} converted`,
     refused > 0 && `${count(refused)} unusable`,
   ];
-  return parts.filter(Boolean).join(", ");
+  return `: ${parts.filter(Boolean).join(", ")}`;
 }
 
 /** Why a button cannot be pressed: what has to be given before. */

@@ -196,7 +196,8 @@ function RunTable({ study, snapshot }: { study: string; snapshot: Schemas["Monit
       </div>
       <Text size="sm" c="dimmed">
         Main trials are those that the study counts. Practice trials, attention questions and checks are not counted, but are among the
-        squares of “Each trial”.
+        squares of “Each trial”. “A person” is the verdict on whether a person took part, from timing, input and checks: likely, unclear or
+        unlikely. Open an unclear or unlikely one to see the reasons.
       </Text>
     </Stack>
   );

@@ -141,12 +141,12 @@ function NoAnswers({ origin, runs, every, series, choose, chooseSeries }: NoAnsw
       </Stack>
     );
   const others = ORIGINS.filter(({ value }) => value !== origin && (runs[value] ?? 0) > 0);
-  const listed = others.map(({ value }) => `${counted(runs[value] ?? 0, "run")} of ${OF[value]}`).join(" and ");
+  const listed = others.map(({ value }) => `${OF[value]} (${counted(runs[value] ?? 0, "run")})`).join(" and ");
   return (
     <Group>
       <Text c="dimmed">
-        No answers of {OF[origin]} in this data series yet
-        {others.length > 0 && `; the only answers are those of ${listed}`}.
+        No answers from {OF[origin]} in this data series yet
+        {others.length > 0 && `, only from ${listed}`}.
       </Text>
       {others.map(({ value, label }) => (
         <Button key={value} variant="default" size="xs" onClick={() => choose(value)}>

@@ -12,6 +12,7 @@ import type { ClipCheck, ClipProgress } from "../clips/examine";
 import { Answer, ErrorAlert, Sentence } from "../ui/Answer";
 import { DataTable } from "../ui/DataTable";
 import { counted, languageName } from "../ui/format";
+import { PreviewButton } from "./recruiting";
 import { TurnedAway } from "./StatusBadge";
 
 type Finding = Schemas["LaunchCheck"];
@@ -147,8 +148,8 @@ function Lines({ title, study, findings }: { title: string; study: string; findi
       <ul className="checklist" aria-label={title}>
         {findings.map((finding) => (
           <li key={`${finding.kind} ${finding.text}`}>
-            <Badge color={finding.blocks ? "red.9" : "gray.7"}>{finding.blocks ? "fix" : "check"}</Badge>
-            <Text size="sm" className="wrap-anywhere">
+            <Badge {...(finding.blocks ? { color: "red.9" } : { variant: "default" })}>{finding.blocks ? "fix" : "check"}</Badge>
+            <Text size="sm" component="div" className="wrap-anywhere">
               <Long text={finding.text} /> <Where study={study} finding={finding} />
             </Text>
           </li>
@@ -186,6 +187,7 @@ const PAGES = {
 /** The way to where a finding is fixed; nothing where that is not a page of the study, or not open to this account. */
 function Where({ study, finding: { page, path } }: { study: string; finding: Finding }) {
   const rights = useQuery(studyQuery(study)).data?.summary.rights ?? [];
+  if (page === "preview" && rights.includes("run")) return <PreviewButton study={study} small />;
   if (page === "preview" || page === "server") return null;
   const { to, label, right } = PAGES[page];
   if (!rights.includes(right)) return null;

@@ -1,12 +1,12 @@
 /** The frame of a study's pages: its name, status and tabs, and the buttons that open and close it. */
 
-import { Button, Card, Group, Modal, Stack, Text, Alert, Tabs, Title } from "@mantine/core";
+import { Card, Group, Modal, Stack, Text, Alert, Tabs, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link, Outlet, useLocation, useNavigate, useParams } from "@tanstack/react-router";
 import { api, unwrap, studyQuery, type Schemas, clipCheckQuery, launchChecksQuery } from "../api";
 import { Answer, onDemand } from "../ui/Answer";
-import { Address, addressFor, RECRUITER_NAMES } from "./recruiting";
-import { TurnedAway, StatusBadge, StudySteps } from "./StatusBadge";
+import { Address, addressFor, PreviewButton, RECRUITER_NAMES } from "./recruiting";
+import { StatusBadge, StudySteps } from "./StatusBadge";
 import { useState, useEffect, useRef } from "react";
 import { keptWork, otherWork } from "../builder/kept";
 import { ConfirmButton } from "../ui/ConfirmButton";
@@ -46,7 +46,6 @@ function OpenedDialog({ study, onClose }: Props) {
                 url={addressFor(url, recruiter)}
               />
             )}
-            <TurnedAway study={study} design={detail?.design} />
             <Text size="sm" c="dimmed">
               Personal links, quotas and completion codes are under{" "}
               <Link to="/studies/$study/links" params={{ study }} onClick={onClose}>
@@ -85,7 +84,7 @@ const WORDS: Record<Status, [label: string, question: string]> = {
   draft: ["Back to draft", "Participants can no longer start; pilot data stay."],
   pilot: ["Open as pilot", "Participants can start; their data are marked as pilot."],
   live: ["Set live", "Participants can start and their data count. Changes now create new versions."],
-  closed: ["Close", "No one can start any more. Runs in progress can finish."],
+  closed: ["Close study", "No one can start any more. Runs in progress can finish."],
 };
 
 const isOpen = (status: Status) => status === "live" || status === "pilot";
@@ -116,21 +115,9 @@ function StatusButtons({ summary }: { summary: Schemas["StudySummary"] }) {
   // Only what is wrong with clips can be overridden: server and browser may be mistaken about a clip.
   const mayOverride = blocking.length > 0 && blocking.every(({ page }) => page === "clips");
   const isBlocked = blocking.length > 0 && !(mayOverride && anyway);
-  const preview = useChange(
-    () =>
-      unwrap(
-        api.POST("/api/admin/studies/{study}/links", {
-          ...path,
-          body: { kind: "preview", label: "preview", labels: [], count: 1, days: 1 },
-        }),
-      ),
-    { touches: [], then: ([link]) => link && window.open(link.url, "_blank", "noopener") },
-  );
   return (
     <Group gap="xs">
-      <Button variant="default" onClick={() => preview.mutate(undefined)} loading={preview.isPending}>
-        Preview as a participant
-      </Button>
+      <PreviewButton study={summary.name} />
       {NEXT[summary.status].map((status) => (
         <ConfirmButton
           key={status}

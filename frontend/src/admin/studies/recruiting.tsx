@@ -1,10 +1,30 @@
-/** What a recruiter is given: the study's address with its parameters, and the key of signed links. */
+/** What a recruiter is given: the study's address with its parameters, and the key of signed links; the preview. */
 
 import { Button, Code, CopyButton, Group, Modal, Stack, Text } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
 import { api, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
+import { useChange } from "../ui/useChange";
+
+/** Opens a preview, whose answers do not count, in a new tab. */
+export function PreviewButton({ study, small = false }: { study: string; small?: boolean }) {
+  const preview = useChange(
+    () =>
+      unwrap(
+        api.POST("/api/admin/studies/{study}/links", {
+          params: { path: { study } },
+          body: { kind: "preview", label: "preview", labels: [], count: 1, days: 1 },
+        }),
+      ),
+    { touches: [], then: ([link]) => link && window.open(link.url, "_blank", "noopener") },
+  );
+  return (
+    <Button variant="default" size={small ? "compact-xs" : "sm"} onClick={() => preview.mutate(undefined)} loading={preview.isPending}>
+      Preview as a participant
+    </Button>
+  );
+}
 
 interface SigningProps {
   study: string;
