@@ -135,21 +135,39 @@ def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
         _conditions(axes, analysis, spec)
         _dress(axes, analysis, spec)
         marks = "Points, thin lines and clouds" if spec.style == "points" else "Points and thin lines"
-        said = f"{marks}: participants. {bars_of(analysis)}"
+        said = f"{marks}: participants. {bars_of(analysis, spec)}"
         write_note(figure, f"N = {analysis.n_participants}. {said}", analysis.synthetic)
     return figure
 
 
-def bars_of(analysis: Analysis) -> str:
-    """What the means and error bars of a figure are.
+def bars_of(analysis: Analysis, spec: FigureSpec) -> str:
+    """What the means and error bars of a figure are, and whether bars are cut at the ends of the scale.
 
     With groups or covariates they are the estimated marginal means of the table, and their intervals.
     """
+    cut = " Bars are cut at the ends of the scale." if _has_cut_bars(analysis, spec) else ""
     if _of_participants_alone(analysis):
-        return "Bars: 95% within-participant CI (Cousineau-Morey)."
+        return f"Bars: 95% within-participant CI (Cousineau-Morey).{cut}"
     covariates = ", ".join(covariate.name for covariate in analysis.anova.between.covariates)
     adjusted = f" at the mean of {covariates} (participants' points are not adjusted)" if covariates else ""
-    return f"Means and bars: estimated marginal means{adjusted} and their 95% CI, as in the table."
+    return f"Means and bars: estimated marginal means{adjusted} and their 95% CI, as in the table.{cut}"
+
+
+def _has_cut_bars(analysis: Analysis, spec: FigureSpec) -> bool:
+    """Whether an interval of a declared study reaches beyond its scale, where the axis ends."""
+    scale = _scale_of(analysis)
+    if scale is None:
+        return False
+    shown = _arranged(analysis, spec)
+    low, high = shown.means - shown.errors, shown.means + shown.errors
+    return bool((low < scale.minimum).any() or (high > scale.maximum).any())
+
+
+def _scale_of(analysis: Analysis) -> RatedScale | None:
+    """The declared scale of the analyzed ratings; None for a table without a declaration."""
+    if analysis.experiment is None:
+        return None
+    return scale_called(analysis.experiment, None if analysis.rating == "response" else analysis.rating)
 
 
 def _of_participants_alone(analysis: Analysis) -> bool:
@@ -309,8 +327,8 @@ def _dress(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
     along = " × ".join(analysis.labels.factor(name) for name in spec.along)
     axes.set_xlabel(wrap_text(along, TITLE_CHARACTERS))
     axes.set_ylabel(wrap_text(analysis.rating, HEIGHT_CHARACTERS))
-    if analysis.experiment is not None:
-        scale = scale_called(analysis.experiment, None if analysis.rating == "response" else analysis.rating)
+    scale = _scale_of(analysis)
+    if analysis.experiment is not None and scale is not None:
         what = "Rating" if analysis.rating == "response" else in_words(scale.name)
         asked = _asked(what, scale, analysis.experiment.languages[0])
         axes.set_ylabel(wrap_text(asked, HEIGHT_CHARACTERS))

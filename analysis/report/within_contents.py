@@ -254,6 +254,6 @@ def draw_all(analysis: Analysis) -> tuple[Picture, ...]:
     pictures = []
     for spec in figures_of(analysis):
         figure = draw(analysis, spec)
-        shown = f"{spec.title}: mean ratings and each participant's mean. {bars_of(analysis)}"
+        shown = f"{spec.title}: mean ratings and each participant's mean. {bars_of(analysis, spec)}"
         pictures.append(Picture(spec.key, spec.title, shown, *in_both_formats(figure)))
     return tuple(pictures)

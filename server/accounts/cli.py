@@ -68,7 +68,7 @@ def link(
     role: Annotated[str, typer.Option(help="owner, experimenter or viewer.")] = "owner",
     label: Annotated[str, typer.Option(help="Name of the person to invite.")] = "",
 ) -> None:
-    """Print a one-time link with which somebody creates their own account.
+    """Print a one-time link for creating an account.
 
     Example: server admin link --role experimenter --label "Ada"
     """
@@ -84,9 +84,9 @@ def reset_password(
     name: Annotated[str, typer.Argument(help="Name of the account.")],
     password: Annotated[str, typer.Option(help="Prompted for if omitted.")] = "",
 ) -> None:
-    """Give an account a new password; its sessions, API tokens and logins by providers end.
+    """Set a new password for an account; its sessions, API tokens and logins by providers end.
 
-    The audit log says so. The logins of an account that had no password stay.
+    The audit log records it. An account that had no password keeps its logins.
 
     Example: server account reset-password ada
     """
@@ -106,9 +106,9 @@ def reset_password(
 
 @account_app.command("reset-second-factor")
 def reset_second_factor(name: Annotated[str, typer.Argument(help="Name of the account.")]) -> None:
-    """Turn an account's second factor off, for the day phone and recovery codes are lost.
+    """Turn off an account's second factor, if phone and recovery codes are lost.
 
-    Its sessions and API tokens end, and the audit log says so. Make sure that it is she who asks.
+    Its sessions and API tokens end, and the audit log records it. First verify who is asking.
     Example: server account reset-second-factor ada
     """
     with stored_services() as services:
@@ -127,9 +127,9 @@ def verify_chain(
         str, typer.Option(help="POSITION:HASH kept from an earlier verification, export or syslog.")
     ] = "",
 ) -> None:
-    """Go along the chain of hashes; exit code 2, and the first entry that does not fit, where it is broken.
+    """Check the chain of hashes; if it is broken, report the first wrong entry, with exit code 2.
 
-    Keep the head it prints elsewhere: with --head the next verification sees whether entries were cut off.
+    Store the printed head elsewhere: with --head, the next check detects whether entries were cut off.
 
     Examples:
 
@@ -144,10 +144,10 @@ def verify_chain(
         raise InputError(f"the audit log is broken: {chain.broken}")
     notes = [f"{chain.position} entries in the chain"]
     notes += (
-        [f"details of {chain.erased} entries erased with the data of their persons"] if chain.erased else []
+        [f"details of {chain.erased} entries erased with the data of participants"] if chain.erased else []
     )
     notes += [f"{chain.before} rows from before the chain existed"] if chain.before else []
-    out.print(f"whole: {', '.join(notes)}\nhead {chain.position}:{chain.hash}")
+    out.print(f"intact: {', '.join(notes)}\nhead {chain.position}:{chain.hash}")
 
 
 def _head(text: str) -> tuple[int, str]:
@@ -164,7 +164,7 @@ def export(
     out_file: Annotated[Path, typer.Option("--out", help="File to write; - for the terminal.")] = Path("-"),
     after: Annotated[int, typer.Option(min=0, help="Omit entries up to this position.")] = 0,
 ) -> None:
-    """Write the entries as JSON lines; the last line says that it is complete, and the chain's head.
+    """Write the entries as JSON lines; the last line confirms completeness and has the head of the chain.
 
     Example: server audit export --out audit.ndjson
     """
@@ -218,9 +218,9 @@ def create_workspace(
     name: Annotated[str, typer.Argument(help="Lowercase letters, digits and hyphens.")],
     title: Annotated[str, typer.Option(help="Title that people see; by default, the name.")] = "",
 ) -> None:
-    """Make a workspace.
+    """Create a workspace.
 
-    Example: server workspace create_workspace perception-lab --title "Perception laboratory"
+    Example: server workspace create perception-lab --title "Perception laboratory"
     """
     try:
         TypeAdapter(WorkspaceName).validate_python(name)
@@ -238,7 +238,7 @@ def set_member(
     role: Annotated[str, typer.Option(help="viewer, experimenter or owner.")] = "experimenter",
     remove: Annotated[bool, typer.Option("--remove", help="Remove the account from the workspace.")] = False,
 ) -> None:
-    """Take an account into a workspace, change its role there, or take it out.
+    """Add an account to a workspace, change its role there, or remove it.
 
     Example: server workspace member perception-lab ada --role owner
     """
@@ -267,7 +267,7 @@ def grant(
 
 @workspace_app.command("move")
 def move(study: StudyArgument, workspace: WorkspaceArgument) -> None:
-    """Put a study into another workspace.
+    """Move a study to another workspace.
 
     Example: server workspace move exp3 perception-lab
     """

@@ -96,8 +96,8 @@ def copy(
 ) -> None:
     """Copy every row from one database to another and compare counts and hashes.
 
-    Stop the server first: what is rated meanwhile would stay behind. Clips and the secret key stay where they
-    are. Where anything differs nothing is kept in the target.
+    Stop the server first: answers given during the copy would be lost. Clips and the secret key stay where
+    they are. If any table differs, nothing is kept in the target.
     Example: server database copy sqlite:///data/palpebra.sqlite postgresql://me@db/lab
     """
 
@@ -120,10 +120,10 @@ def register_snapshots(app: typer.Typer) -> None:
 
 
 def snapshot() -> None:
-    """Take a snapshot of the SQLite database now, while the server goes on.
+    """Take a snapshot of the SQLite database now; the server can keep running.
 
-    The server takes them by itself where PALPEBRA_SNAPSHOT_MINUTES is set. They stay in the data folder: all
-    of the last hour, one an hour of the last day, one a day of the last week.
+    With PALPEBRA_SNAPSHOT_MINUTES, the server takes them itself. They stay in the data folder: all of the
+    last hour, one per hour of the last day, one per day of the last week.
 
     Example: server database snapshot
     """
@@ -157,10 +157,10 @@ def back(
         ),
     ],
 ) -> None:
-    """Make the SQLite database as it was at a moment; stop the server first.
+    """Restore the SQLite database to an earlier moment; stop the server first.
 
-    What is there now is set aside next to it under another name: remove it once all is well. Everyone who was
-    erased since is erased again; clips stay, they are kept by their content.
+    The present database is kept next to it under another name: remove it when all is well. People erased
+    since then are erased again. Clips stay as they are.
 
     Examples:
 
@@ -201,7 +201,7 @@ def _register_database(parent: typer.Typer) -> None:
 
 @app.command("upgrade")
 def upgrade() -> None:
-    """Make or change the tables so that they fit this program; nothing happens where they do.
+    """Create or upgrade the tables for this version of the program; nothing happens if they are current.
 
     The database is DATABASE_URL, or SQLite in the data folder.
     Example: DATABASE_URL=postgresql://me@localhost/palpebra server database upgrade
@@ -213,7 +213,7 @@ def upgrade() -> None:
 
 @app.command("status")
 def status() -> None:
-    """Say which revision the database has, and which this program expects.
+    """Show the revision of the database, and the one that this program expects.
 
     Example: server database status
     """
@@ -227,9 +227,9 @@ def status() -> None:
 
 @app.command("recount")
 def recount() -> None:
-    """Count every run's ratings again and fix the counts that differ; the server may go on meanwhile.
+    """Count every run's ratings again and correct those that differ; the server can keep running.
 
-    Results, monitor and participants read these counts; `server doctor` says whether they are right.
+    Results, monitor and participants read these counts; `server doctor` checks them.
     Example: server database recount
     """
     with stored_services() as services:
@@ -246,11 +246,11 @@ def rewrap(
         ),
     ],
 ) -> None:
-    """Carry over what was kept under the old key, after the secret key was changed.
+    """After a change of the secret key, re-encrypt what the old key protects.
 
-    Recruiters' ids, second factors and the audit log's chain are made to fit the key of the settings. Move
-    the key file away from your backups afterwards and back up again, but keep it: the backups made so
-    far open with it alone (server restore FILE --keys).
+    Recruiters' ids, second factors and the chain of the audit log are converted to the key of the settings.
+    Afterwards make a new backup and store the old key apart from your backups. Keep it: earlier backups can
+    only be restored with it (server restore FILE --keys).
     Example: server database rewrap /media/safe/secret_key
     """
     try:
@@ -281,10 +281,10 @@ def rewrap(
 
 @app.command("erase-again")
 def erase_again() -> None:
-    """Erase the runs that the ledger of erasures names (erasures.ndjson in the data folder).
+    """Erase again the runs listed in the ledger of erasures (erasures.ndjson in the data folder).
 
-    `server restore` does so by itself; this is for a ledger that was put there afterwards, or for a database
-    that was brought back by other means.
+    `server restore` does this itself. Use it if the ledger was added later, or if the database was restored
+    by other means.
     Example: server database erase-again
     """
     with stored_services() as services, services.database.write() as session:

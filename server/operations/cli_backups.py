@@ -85,11 +85,11 @@ def backup(
 ) -> None:
     """Back up database, clips and secret key in one file while the server runs.
 
-    The file holds everybody's answers and the secret key: keep it where only you can read it (mode 600), or
-    encrypt it for another host by --to. The keys of recruiters' ids are in palpebra-keys.json, which each
-    backup replaces: keep one copy of it, the newest, so that who is erased is erased from older backups too.
+    The file contains all answers and the secret key: keep it where only you can read it (mode 600), or
+    encrypt it for another host with --to. The keys of recruiters' ids are in palpebra-keys.json, which each
+    backup replaces. Keep only the newest copy of it, so that erased people are erased from older backups too.
 
-    Folders of FILE and of the key file must be there.
+    The folders of FILE and of the key file must exist.
 
     Examples:
 
@@ -274,9 +274,8 @@ def drill(
     """Test the newest backup: restore it to a temporary place, check it and remove it; exit code 1 on
     failure.
 
-    Nothing of the server's own data is touched. The server makes this drill weekly by itself where it knows
-    the folder of its backups; /metrics and `server doctor` report how the last one went. Encrypted backups it
-    drills where it has their private key.
+    The data of the server are not touched. If PALPEBRA_BACKUP_FOLDER is set, the server runs this drill every
+    week; /metrics and `server doctor` report the last result. Encrypted backups need their private key.
 
     Examples:
 

@@ -176,7 +176,7 @@ def return_addresses(services: Services) -> Iterator[Finding]:
         advice = "on the study's page, under Running, write out the host of the URL; create these links again"
         yield Finding("return addresses", "warning", said + (", ..." if len(named) > 5 else ""), advice)
     else:
-        yield Finding("return addresses", "ok", "all have a host that is written out")
+        yield Finding("return addresses", "ok", "each has a fixed host")
 
 
 # What `server doctor` looks at; each check says what it found and, where it is wrong, what to do.
@@ -257,7 +257,7 @@ def file_modes(services: Services) -> Iterator[Finding]:
         yield Finding("file modes", "ok", "for this user only")
         return
     more = "or more " if len(open_files) == 1000 else ""
-    said = f"{len(open_files)} {more}open to other users, such as {open_files[0]}"
+    said = f"{len(open_files)} {more}open to other users of this computer, such as {open_files[0]}"
     yield Finding("file modes", "failed", said, f"run: chmod -R go= {' '.join(map(str, folders))}")
 
 

@@ -44,9 +44,9 @@ def export(
     run: Run = "",
     identifier: RecruitersId = "",
 ) -> None:
-    """Write everything that is stored of one person (a request for access under data protection law).
+    """Write all stored data of one person (a request for access under data protection law).
 
-    In all visits to the study that are known to be theirs, table by table; the audit log records it.
+    The file has every visit known to be theirs, table by table. The audit log records the request.
 
     Examples:
 
@@ -72,7 +72,7 @@ def erase_person(
     identifier: RecruitersId = "",
     confirmed: Annotated[bool, typer.Option("--yes", help="Erase without confirmation.")] = False,
 ) -> None:
-    """Erase everything that is stored of one person, in all visits known to be hers; for good.
+    """Erase all stored data of one person permanently, in all visits known to be theirs.
 
     Examples:
 

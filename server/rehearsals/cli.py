@@ -61,11 +61,11 @@ def simulate(
 ) -> None:
     """Run simulated participants through the HTTP API; their runs have the origin `simulated`.
 
-    No count, quota, result or report of people's answers holds them: a study is rehearsed as a draft.
+    Counts, quotas, results and reports of people's answers never include them, so you can rehearse a draft.
 
-    Each goes through consent, forms, calibration and every trial. Answers follow a rater model with effects
+    Each completes consent, forms, calibration and every trial. Answers follow a rater model with effects
     drawn by the seed, so that an analysis has something to find; they say nothing about people.
-    With --as they are held to what people are held to, and the verdict on each run is printed.
+    With --as they pass the same checks as people, and the verdict on each run is printed.
 
     Examples:
 

@@ -290,7 +290,7 @@ def _rehearsal(session: Session, study: Study) -> Iterator[LaunchCheck]:
     if any(job.status == "done" and job.parameters.get("version") == number for job in jobs):
         return
     if not jobs:
-        what = "No rehearsal was made."
+        what = "There is no rehearsal yet."
     elif jobs[0].status == "failed":
         what = f"The last rehearsal failed: {jobs[0].message}."
     elif jobs[0].status == "done":

@@ -75,12 +75,12 @@ def add(
             help="Folder with manifest.json and its clips (`stimuli build`; for your own `stimuli manifest`)."
         ),
     ],
-    name: Annotated[str, typer.Option(help="Name on this server; the experiment's where not given.")] = "",
+    name: Annotated[str, typer.Option(help="Name on this server. Default: the experiment's name.")] = "",
     open_: Annotated[bool, typer.Option("--open", help="Set it live and print its general link.")] = False,
 ) -> None:
-    """Take an experiment and its clips into the server: all of it, or nothing.
+    """Add an experiment and its clips to the server, completely or not at all.
 
-    Doing it again changes nothing; a changed declaration or changed clips make a new version.
+    Adding the same again changes nothing; a changed definition or changed clips create a new version.
     Example: server study add exp3 --clips out/exp3 --open
     """
     text = locate(experiment).read_text(encoding="utf-8")
@@ -177,7 +177,7 @@ def set_status(
     status: Annotated[str, typer.Argument(help="draft, pilot, live or closed.")],
     anyway: Annotated[
         bool,
-        typer.Option(help="Set it live although clips are missing or do not decode; the audit notes it."),
+        typer.Option(help="Set it live although clips are missing or do not decode; this is audited."),
     ] = False,
 ) -> None:
     """Open or close a study. Before it is live, each of its clips is decoded.
@@ -221,16 +221,16 @@ def create(
     study: Annotated[str, typer.Argument(help="Name of the study.")],
     kind: Annotated[str, typer.Option(help="general, personal (one person) or preview.")] = "general",
     label: Annotated[
-        str, typer.Option(help="Whom or what it is for; personal: the participant's name.")
+        str, typer.Option(help="Person or purpose of the link; for personal links the participant's name.")
     ] = "",
     count: Annotated[int, typer.Option(min=1, max=10_000, help="How many personal links.")] = 1,
-    quota: Annotated[int | None, typer.Option(min=1, help="Most participants by this link.")] = None,
+    quota: Annotated[int | None, typer.Option(min=1, help="Maximum number of participants.")] = None,
     expires_hours: Annotated[float | None, typer.Option(min=0.0, help="Hours until it expires.")] = None,
     group: Annotated[
-        str, typer.Option(help="Group of who comes by it, such as fast, where links decide groups.")
+        str, typer.Option(help="Group of its participants, such as fast, if links assign groups.")
     ] = "",
 ) -> None:
-    """Make a link (or many personal ones) and print its address, with its label where there are several.
+    """Create a link, or many personal links, and print the addresses (with labels if there are several).
 
     Example: server link create exp3 --kind personal --label P --count 20 > links.csv
     """

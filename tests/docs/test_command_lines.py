@@ -156,9 +156,10 @@ def leaf_commands(command: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[An
 
 @pytest.mark.parametrize("program", PROGRAMS)
 def test_help_breaks_lines_between_words_only(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A word longer than the column of its option is cut in the middle: `thr eshold=200`."""
+    """A word longer than its column is cut in the middle: `thr eshold=200`. A hyphen may end a line."""
     monkeypatch.setenv("COLUMNS", "80")
     for command, path in leaf_commands(PROGRAMS[program]):
         shown = CliRunner().invoke(APPS[program], [*path, "--help"]).output
-        words = [word for option in command.params for word in (getattr(option, "help", "") or "").split()]
+        texts = [getattr(option, "help", "") or "" for option in command.params]
+        words = [word for text in texts for word in re.split(r"\s+|(?<=-)", text)]
         assert [word for word in words if word not in shown] == [], path

@@ -2,7 +2,7 @@
 import type * as Plot from "@observablehq/plot";
 import { describe, expect, it } from "vitest";
 import { choicePlot, levelPlot } from "../../src/admin/kinds/paired_comparison/plots";
-import { cellPlot, delayPlot, marginPlot, timePlot } from "../../src/admin/results/plots";
+import { cellPlot, delayPlot, marginPlot, marginRows, timePlot } from "../../src/admin/results/plots";
 import { seriesPlot } from "../../src/admin/kinds/threshold/plots";
 import { cellTracePlot, tracesPlot } from "../../src/admin/kinds/continuous_rating/plots";
 
@@ -69,6 +69,19 @@ describe("the chart of means", () => {
       "N = 3. Small points: participants (2 shown). Large points: their means. Bars: 95% within-participant CI (Cousineau-Morey).",
     );
     expect(caption([mean({ speed: "20" }, 4.25, null)])).toContain("No bars");
+  });
+
+  it("keeps the axis to the scale, and says that bars are cut at its ends", () => {
+    const wide = [mean({ speed: "20" }, 6.5, 1), mean({ speed: "100" }, 1.5, 2)];
+    const plot = marginPlot({ factors: ["speed"], means: wide }, SCALE, FACTORS);
+    expect(plot.y?.domain).toEqual([1, 7]);
+    expect(drawn(plot, "rule").map(({ y1, y2 }) => [y1, y2])).toEqual([
+      [5.5, 7],
+      [1, 3.5],
+    ]);
+    expect(plot.caption).toContain("Bars are cut at the ends of the scale; the CSV has the whole intervals.");
+    expect(marginPlot({ factors: ["speed"], means }, SCALE, FACTORS).caption).not.toContain("cut");
+    expect(marginRows({ factors: ["speed"], means: wide }, FACTORS).map((row) => row["ci95_high"])).toContain(7.5);
   });
 
   it("has bars without length where there is no interval", () => {

@@ -253,7 +253,7 @@ describe("the checklist", () => {
   });
 
   it("counts what keeps a study from going live apart from what is to be checked", () => {
-    expect(summaryOf([])).toBe("Nothing speaks against going live.");
+    expect(summaryOf([])).toBe("Nothing prevents going live.");
     expect(summaryOf([finding("a")])).toBe("1 thing to check. None of them prevents going live.");
     expect(summaryOf([finding("a", true), finding("b", true), finding("c")])).toBe("2 to fix before it goes live, 1 to check.");
   });
@@ -271,7 +271,7 @@ describe("the checklist", () => {
     expect(languageFindings(["en"])).toEqual([]);
     expect(languageFindings(["en", "de-AT", "tlh"]).map(({ text }) => text)).toEqual([
       expect.stringContaining("in English for"),
-      expect.stringContaining("not reviewed by a speaker"),
+      expect.stringContaining("not been reviewed by a native speaker"),
     ]);
   });
 });

@@ -9,12 +9,19 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
+from analysis.plans.clip_rating import analyse_study
+from analysis.plans.plan import plan_of
 from analysis.plans.result import Analysis, Labels, analyse_cells
 from analysis.read.long_csv import design_of, read_long_table
-from analysis.report.figures import draw, figures_of
+from analysis.read.pool import Pool
+from analysis.read.study_answers import load_csv
+from analysis.report.figures import bars_of, draw, figures_of
 from analysis.report.pictures import STYLE
 from analysis.within.cell_means import cell_table
+from experiments.load import load_experiment
+from tests.analysis.ratings_file import rows_of, simulate, write_export
 
+EXP3 = load_experiment("exp3").model_copy(update={"exclusions": ()})
 GOLDEN = Path(__file__).parents[2] / "golden" / "r" / "between"
 
 
@@ -85,6 +92,20 @@ def test_the_caption_says_what_the_bars_are(tmp_path: Path) -> None:
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "estimated marginal means at the mean of age" in page
     assert "Cousineau" not in page
+
+
+@pytest.mark.parametrize("extreme", [False, True])
+def test_bars_beyond_the_scale_are_cut_and_the_caption_says_so(extreme: bool, tmp_path: Path) -> None:
+    ratings = simulate(EXP3, 4)
+    if extreme:  # One of four people differs by the whole scale: the interval ends above 7.
+        ratings[:] = 7
+        ratings[0, 0] = 1
+    file = write_export(tmp_path / "r.csv", EXP3, rows_of(EXP3, ratings))
+    analysis = analyse_study(EXP3, load_csv(file, EXP3, plan_of(EXP3.trial.kind).reading), Pool())
+    [spec] = figures_of(analysis)
+    low, high = draw(analysis, spec).axes[0].get_ylim()
+    assert (round(low, 1), round(high, 1)) == (0.8, 7.2)
+    assert ("Bars are cut at the ends of the scale." in bars_of(analysis, spec)) == extreme
 
 
 def assert_texts_are_whole(figure) -> None:

@@ -167,7 +167,7 @@ def found_by_browser(files: list[str]) -> dict[str, str]:
         "a clip of nothing": rf"1 clip shows nothing: {files[5]}",
         "a clip that begins with nothing": rf"1 clip begins with an empty picture: {files[6]}",
         "one file in two cells": r"1 clip is the same file in several cells",
-        "an unreviewed language": r"not reviewed by a speaker",
+        "an unreviewed language": r"not been reviewed by a native speaker",
     }
 
 
@@ -241,7 +241,7 @@ def test_the_checklist_of_the_studys_page_leads_to_where_each_fault_is_fixed(
         ('The text "Consent"', "Build, Texts", "build?section=texts"),
         ("No limit is set", "Settings", "settings"),
         ("plan is not sealed", "Data", "data"),
-        ("No rehearsal was made", "Rehearsal", "rehearsal"),
+        ("There is no rehearsal yet", "Rehearsal", "rehearsal"),
         ("shows no motion", "Clips", "clips"),
     ):
         line = checklist.get_by_role("listitem").filter(has_text=words).first

@@ -119,8 +119,10 @@ def test_bars_and_points_are_those_computed_from_the_exported_csv(
     chart = read_chart(plot)
     page.set_viewport_size({"width": 1280, "height": 800})
     assert len(people) >= 3
-    assert [middle for middle, _ in chart.bars] == pytest.approx(list(means), abs=2 * PIXEL)
-    assert [half for _, half in chart.bars] == pytest.approx(list(halves), abs=PIXEL)
+    # The axis is the scale, and bars are cut at its ends.
+    low, high = np.clip(means - halves, 1, 7), np.clip(means + halves, 1, 7)
+    assert [middle for middle, _ in chart.bars] == pytest.approx(list((low + high) / 2), abs=2 * PIXEL)
+    assert [half for _, half in chart.bars] == pytest.approx(list((high - low) / 2), abs=PIXEL)
     if len(factors) == 1:
         assert chart.points[4] == pytest.approx(list(means), abs=2 * PIXEL)
         assert sorted(chart.points[2]) == pytest.approx(sorted(people.ravel()), abs=2 * PIXEL)
@@ -131,3 +133,5 @@ def test_bars_and_points_are_those_computed_from_the_exported_csv(
     caption = plot.locator("figcaption").inner_text()
     assert caption.startswith(f"N = {len(people)}. ")
     assert "Bars: 95% within-participant CI" in caption
+    is_cut = bool((means - halves < 1).any() or (means + halves > 7).any())
+    assert ("Bars are cut at the ends of the scale" in caption) == is_cut

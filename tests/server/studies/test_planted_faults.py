@@ -313,7 +313,7 @@ FAULTS: dict[str, Fault] = {
     # What is done before.
     "a plan that is not sealed": Fault("plan", "plan is not sealed", without="seal"),
     "a version that nobody tried": Fault("not_tried", "Nobody has completed version 1", without="preview"),
-    "no rehearsal": Fault("rehearsal", "No rehearsal was made", without="rehearsal"),
+    "no rehearsal": Fault("rehearsal", "There is no rehearsal yet", without="rehearsal"),
     "a rehearsal that failed": Fault(
         "rehearsal",
         "failed: out of memory",

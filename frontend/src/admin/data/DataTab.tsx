@@ -284,7 +284,7 @@ export function DataTab() {
         <Text size="sm">
           {origin === "all" ? "The column run_origin identifies the origin. " : ""}
           {series === null && (detail?.series.length ?? 1) > 1 ? "The column data_series identifies the data series. " : ""}
-          Excluded runs are in the files, marked in their column; previews and erased people are not.
+          Files include excluded runs, marked in the column “excluded”, but no previews and no erased participants.
         </Text>
       </Group>
       <Switch

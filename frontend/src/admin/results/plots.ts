@@ -92,8 +92,9 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
     x: across.of(levels[first] ?? ""),
     colour: second === undefined ? "" : hues.of(levels[second] ?? ""),
     mean,
-    low: low ?? mean,
-    high: high ?? mean,
+    // The axis is the scale: intervals of few people that reach beyond it are cut, and the caption says so.
+    low: Math.max(low ?? mean, scale.minimum),
+    high: Math.min(high ?? mean, scale.maximum),
     people,
   }));
   const crossed = second !== undefined;
@@ -119,14 +120,9 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
   return {
     height: 280,
     marginBottom: belowOf(domain) + TITLE_PX,
-    caption: marginCaption(margin),
+    caption: marginCaption(margin, scale),
     x: { type: "point", padding: 0.6, label: null, domain },
-    y: {
-      // Intervals of few people reach beyond the scale; a bar that leaves its figure could not be read.
-      domain: [Math.min(scale.minimum, ...rows.map(({ low }) => low)), Math.max(scale.maximum, ...rows.map(({ high }) => high))],
-      grid: true,
-      label: `mean ${scale.name}`,
-    },
+    y: { domain: [scale.minimum, scale.maximum], grid: true, label: `mean ${scale.name}` },
     color: crossed ? { domain: hues.all, range: PALETTE } : {},
     symbol: crossed ? { domain: hues.all, range: SYMBOLS, legend: true } : {},
     // Long labels break into lines.
@@ -135,7 +131,7 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
 }
 
 /** What points and bars are, and of how many people. */
-function marginCaption({ means }: Schemas["Margin"]): string {
+function marginCaption({ means }: Schemas["Margin"], { minimum, maximum }: Results["scale"]): string {
   const numbers = [...new Set(means.map(({ participants }) => participants))].sort((a, b) => a - b);
   const people = numbers.length > 1 ? `${String(numbers[0])} to ${String(numbers.at(-1))}` : String(numbers[0] ?? 0);
   const shown = Math.max(0, ...means.map((mean) => mean.people.length));
@@ -143,7 +139,9 @@ function marginCaption({ means }: Schemas["Margin"]): string {
   const bars = means.some(({ low, high }) => low !== null && high !== null && low < high)
     ? "Bars: 95% within-participant CI (Cousineau-Morey)."
     : "No bars: an interval needs at least two participants with different answers.";
-  return `N = ${people}. Small points: participants${some}. Large points: their means. ${bars}`;
+  const isCut = means.some(({ low, high }) => (low ?? minimum) < minimum || (high ?? maximum) > maximum);
+  const cut = isCut ? " Bars are cut at the ends of the scale; the CSV has the whole intervals." : "";
+  return `N = ${people}. Small points: participants${some}. Large points: their means. ${bars}${cut}`;
 }
 
 const SHARE_COLOUR = "#3c8697";

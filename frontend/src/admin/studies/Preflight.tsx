@@ -60,7 +60,7 @@ export function Preflight({ study, atOnce = false, override }: Props) {
 export function summaryOf(findings: readonly Finding[]): string {
   const fix = findings.filter(({ blocks }) => blocks).length;
   const look = findings.length - fix;
-  if (findings.length === 0) return "Nothing speaks against going live.";
+  if (findings.length === 0) return "Nothing prevents going live.";
   if (fix === 0) return `${counted(look, "thing")} to check. None of them prevents going live.`;
   return `${String(fix)} to fix before it goes live${look > 0 ? `, ${String(look)} to check` : ""}.`;
 }
@@ -78,7 +78,11 @@ export function languageFindings(languages: readonly string[]): Finding[] {
   return [
     ...(missing.length > 0 ? [finding(`Buttons and hints of the participant page are in English for ${named(missing)}.`)] : []),
     ...(unread.length > 0
-      ? [finding(`Buttons and hints in ${named(unread)} were not reviewed by a speaker. Have them read before people take part.`)]
+      ? [
+          finding(
+            `Buttons and hints in ${named(unread)} have not been reviewed by a native speaker. Have them reviewed before people take part.`,
+          ),
+        ]
       : []),
   ];
 }
