@@ -152,7 +152,8 @@ def serve_folder(
         typer.echo(f"Data folder: {place}")
         if place != default_folder():
             typer.echo(f"For commands on these data: export {DATA_VARIABLE}={shlex.quote(str(place))}")
-        typer.echo(f"Open {address}")
+        # On a line alone, so that it can be copied, with room to the log that follows.
+        typer.secho(f"\nOpen {address}\n", bold=True)
         typer.echo("Stop with Ctrl-C.")
         with around():
             if with_browser:

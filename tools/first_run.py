@@ -51,6 +51,12 @@ def studies_made() -> dict[str, bool]:
         database.close()
 
 
+def is_current(study: str, stamp_text: str, made: Mapping[str, bool]) -> bool:
+    """Whether nothing is to be done: the stamp fits, or the study was archived, deleted or closed."""
+    stamp = DATA / "stimuli" / study / ".first_run"
+    return study in made and (not made[study] or (stamp.is_file() and stamp.read_text() == stamp_text))
+
+
 def prepare(study: str, stamp_text: str, made: Mapping[str, bool]) -> None:
     """Build a study's clips and take it into the server; nothing where the stamp says `stamp_text`.
 
@@ -60,9 +66,12 @@ def prepare(study: str, stamp_text: str, made: Mapping[str, bool]) -> None:
     """
     folder = DATA / "stimuli" / study
     stamp = folder / ".first_run"
-    if study in made and (not made[study] or (stamp.is_file() and stamp.read_text() == stamp_text)):
+    if is_current(study, stamp_text, made):
         return
-    print(f"[clips] {study}: rendering those that are not there yet", flush=True)
+    print(
+        f"[clips] {study} ({STUDIES.index(study) + 1} of {len(STUDIES)}): rendering what is missing",
+        flush=True,
+    )
     call("stimuli", "build", study, "--out", str(folder), "--quiet-when-current")
     call("server", "study", "add", study, "--clips", str(folder), *[] if study in made else ["--open"])
     stamp.write_text(stamp_text)
@@ -99,6 +108,13 @@ def main() -> None:
     os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")  # links name it before the start
     call("server", "database", "upgrade")
     stamp_text, made = sources(), studies_made()
+    if due := [study for study in STUDIES if not is_current(study, stamp_text, made)]:
+        # The server starts afterwards: clips that are rendered while somebody rates would disturb playback.
+        print(
+            f"[clips] to build: {', '.join(due)}. The first time takes a few minutes. The link to open is "
+            "printed at the end.",
+            flush=True,
+        )
     for study in STUDIES:
         prepare(study, stamp_text, made)
     draw_strips(stamp_text)

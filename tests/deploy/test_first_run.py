@@ -50,6 +50,17 @@ def test_clips_without_a_database_become_studies_once(added: list[str], tmp_path
     assert added == 2 * [f"{study} --open" for study in first_run.STUDIES]
 
 
+def test_the_wait_is_announced_with_what_is_built(
+    added: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    first_run.main()
+    said = capsys.readouterr().out
+    assert "[clips] to build: exp3, exp1, exp2. The first time takes a few minutes. The link to open" in said
+    assert "[clips] exp1 (2 of 3): rendering what is missing" in said
+    first_run.main()
+    assert "[clips]" not in capsys.readouterr().out
+
+
 def test_what_was_archived_deleted_or_closed_stays_so_when_the_program_is_newer(
     added: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -194,6 +194,9 @@ def test_server_starts_without_extras_and_without_what_only_unix_has(tmp_path: P
             assert link.stdout.startswith(f"http://localhost:{port}/admin/invitation#")
         finally:
             process.terminate()
+        said = process.stdout.read().decode() if process.stdout else ""
+        # On a line alone, set apart from the lines before and from the log.
+        assert re.search(rf"\n\nOpen http://localhost:{port}/admin/start#\S+\n\nStop with Ctrl-C", said)
 
 
 def answers(port: int, path: str) -> bool:
