@@ -76,6 +76,16 @@ def test_unfilled_placeholders_keep_the_study_from_going_live(dashboard: Dashboa
     dialog.get_by_role("button", name="Cancel").click()
 
 
+def test_preview_and_definition_have_buttons_on_the_design_page(dashboard: Dashboard, failing: str) -> None:
+    page = dashboard.open("/studies/unfilled")
+    not_tried = page.get_by_role("listitem").filter(has_text="not even as a preview")
+    expect(not_tried.get_by_role("button", name="Preview as a participant")).to_be_visible()
+    page.get_by_role("button", name="Definition (TOML)").click()
+    with page.expect_download() as saved:
+        page.get_by_role("link", name="Download unfilled.toml").click()
+    assert parse_experiment(saved.value.path().read_text(encoding="utf-8")).name == "unfilled"
+
+
 def test_a_clip_that_nobody_can_see_is_named_on_every_page_of_its_study(
     dashboard: Dashboard, failing: str
 ) -> None:

@@ -197,7 +197,7 @@ function RunTable({ study, snapshot }: { study: string; snapshot: Schemas["Monit
       <Text size="sm" c="dimmed">
         Main trials are those that the study counts. Practice trials, attention questions and checks are not counted, but are among the
         squares of “Each trial”. “A person” is the verdict on whether a person took part, from timing, input and checks: likely, unclear or
-        unlikely. Open an unclear or unlikely one to see the reasons.
+        unlikely. Open an unclear or unlikely one to see the reasons. Not judged: the run is not over, or its page sent no evidence.
       </Text>
     </Stack>
   );

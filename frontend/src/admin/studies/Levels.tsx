@@ -90,7 +90,7 @@ export function Levels({ name, template, asked: typed, onAsk, upload, isLooked, 
     csv: () => reservedProblem(factorsOfTable(csv)),
   }[by];
   const needed = [
-    (!isLooked || files.length === 0) && "clips that have been looked into",
+    (!isLooked || files.length === 0) && "clips that have been checked",
     notPlayed,
     lacks?.() ?? false,
     name === "" && "a short name (above)",

@@ -6,7 +6,7 @@ import { api, type Schemas, unwrap, studyQuery } from "../api";
 import { useChange } from "../ui/useChange";
 
 const MEANS: Record<Schemas["NewLinks"]["kind"], string> = {
-  general: "Any number of people use the same link.",
+  general: "Anyone can use the same link.",
   personal: "Each link is for one person, who can continue on another device.",
   preview: "For you: works for drafts too; answers are not kept.",
 };
@@ -79,7 +79,7 @@ export function NewLinks({ study }: { study: string }) {
             onClick={() => make.mutate(undefined)}
             loading={make.isPending}
           >
-            Make
+            {kind === "personal" ? "Create links" : "Create link"}
           </Button>
         </Group>
         {kind === "personal" && (
