@@ -206,13 +206,12 @@ def _unknown_name(name: str, stem: str) -> str:
         return f"no experiment '{name}'; for the file of this name, write {name}.toml"
     begins = (shipped for shipped in names if len(stem) > 3 and shipped.startswith(stem))
     near = next(begins, None) or nearest(stem, names, cutoff=0.7)
-    if near:
-        return f"no experiment '{name}'; did you mean '{near}'? E{expected[1:]}"
+    said = f"no experiment '{name}'; " + (f"did you mean '{near}'? E{expected[1:]}" if near else expected)
     if "/" in name:
-        return f"no experiment '{name}'; {expected}"
+        return said
     return (
-        f"no experiment '{name}'; {expected}. For a study made in the browser, open its Design tab, download "
-        f"the definition and write {name}.toml"
+        f"{said}. For a study made in the browser, open its Design tab, download the definition and write "
+        f"{name}.toml"
     )
 
 
