@@ -199,7 +199,7 @@ def _header(path: Path, page: Page) -> list[str]:
     while names and not names[-1]:
         names.pop()
     if not names:
-        raise InputError(f"{path.name} is empty; expected a header row and one row a trial")
+        raise InputError(f"{path.name} is empty; expected a header row and one row per trial")
     return names
 
 

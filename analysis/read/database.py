@@ -56,7 +56,7 @@ class AnswersQuery:
         self._engine.dispose()
 
     def rows(self, further: Sequence[str], factors: Sequence[str]) -> pd.DataFrame:
-        """Main and attention rows: text as categories, numbers float, a column a factor, a run's columns.
+        """Main and attention rows: text as categories, numbers float, a column per factor, a run's columns.
 
         The columns of a run (`RUN_TEXTS`, `RUN_FLAGS`) are fetched once a run, not once a row.
         """
@@ -193,7 +193,7 @@ class _Numbers:
 
 
 def _factor_columns(levels: "pd.Categorical[str]", factors: Sequence[str]) -> dict[str, Any]:
-    """A column a factor from the JSON objects in `levels`; empty where a row has none."""
+    """A column per factor from the JSON objects in `levels`; empty where a row has none."""
     # Once per distinct text: a design has few cells, however many rows there are.
     parsed = [json.loads(level) if level else {} for level in levels.categories]
     columns: dict[str, Any] = {}

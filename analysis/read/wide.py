@@ -1,4 +1,4 @@
-"""Wide tables, one row a person and one column a cell of the design, made long."""
+"""Wide tables, one row per person and one column per cell of the design, made long."""
 
 import re
 from collections import Counter

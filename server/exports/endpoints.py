@@ -171,19 +171,19 @@ AskedAsCsv = Annotated[Download, Depends(_asked_as_csv)]
 
 @router.get("/ratings.csv", response_class=StreamingResponse)
 def download_ratings(asked: AskedAsCsv) -> StreamingResponse:
-    """One row a play: the columns of the codebook, one column a factor."""
+    """One row per play: the columns of the codebook, one column per factor."""
     return asked.stream("csv", CSV_TYPE, "ratings.csv")
 
 
 @router.get("/wide.csv", response_class=StreamingResponse)
 def download_wide(asked: AskedAsCsv) -> StreamingResponse:
-    """One row a visit: a column a question of the forms, and a column a cell with the mean rating in it."""
+    """One row per visit: a column per form question, and a column per cell with its mean rating."""
     return asked.stream("wide", CSV_TYPE, "wide.csv")
 
 
 @router.get("/runs.csv", response_class=StreamingResponse)
 def download_runs(asked: AskedAsCsv) -> StreamingResponse:
-    """One row a visit, a column a question of the forms."""
+    """One row per visit, a column a question of the forms."""
     return asked.stream("runs", CSV_TYPE, "runs.csv")
 
 
@@ -235,7 +235,7 @@ def download_codebook(database: DatabaseDep, identity: Viewer, study: str) -> Re
 def download_converted(
     asked: Asked, table: Literal["ratings", "wide"], ending: Literal["sav", "parquet"]
 ) -> FileResponse:
-    """One row a play, or the wide table, for SPSS or as Parquet: with labels of variables and levels."""
+    """One row per play, or the wide table, for SPSS or as Parquet: with labels of variables and levels."""
     # The last route of this file: its path would match those of the other downloads.
     form = CONVERTED[table, ending]
     if not _converting.acquire(blocking=False):

@@ -74,7 +74,7 @@ def convert(folder: Path, ending: Ending) -> Path:
 
 
 def identity_rows(session: Session, study: Study) -> Iterator[list[Any]]:
-    """Header and one row a visit whose person is known to the recruiter, or by the label of a link."""
+    """Header and one row per visit whose person is known to the recruiter, or by the label of a link."""
     yield [column.name for column in IDENTITY_COLUMNS]
     for person in repository.known_people(session, study):
         yield [
@@ -109,17 +109,17 @@ Pieces = Callable[[Session, Study, Extract], Iterator[bytes]]
 
 
 def ratings_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
-    """One row a play: the columns of the codebook, one column a factor."""
+    """One row per play: the columns of the codebook, one column per factor."""
     yield from rating_pieces(session, study, extract)
 
 
 def runs_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
-    """One row a visit, a column a question of the forms."""
+    """One row per visit, a column a question of the forms."""
     yield from csv_pieces(runs_table(session, study, extract).with_header())
 
 
 def wide_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
-    """One row a visit, a column a cell of the design."""
+    """One row per visit, a column per cell of the design."""
     yield from csv_pieces(wide_table(session, study, extract).with_header())
 
 

@@ -194,7 +194,7 @@ def raw_lines(session: Session, study: Study, extract: Extract) -> Iterator[str]
         yield runs.timeline(session, study, public_id).model_dump_json() + "\n"
 
 
-# The wide table: one row a run, and a column a cell of the design with the run's mean rating in it.
+# The wide table: one row per run, and a column per cell of the design with the run's mean rating in it.
 
 OF_THE_RUN = (
     "study", "run", "participant", "synthetic", "status", "language", "version", "started_at",
@@ -257,7 +257,7 @@ def _mean_of(scale: RatedScale, cell: str) -> str:
 def wide_columns(
     experiment: Experiment, forms: Sequence[FormColumn], old_order: bool = False
 ) -> list[Column]:
-    """The run, its groups, its answers to forms, how many answers are averaged, and a column a cell."""
+    """The run, its groups, its answers to forms, how many answers are averaged, and a column per cell."""
     of_forms = {one.column.name for one in forms}
     kept = [one for one in run_columns(forms, old_order) if one.name in OF_THE_RUN or one.name in of_forms]
     between = [
@@ -477,7 +477,7 @@ class ExportTable:
 
 
 def answers_table(session: Session, study: Study, extract: Extract) -> ExportTable:
-    """One row a play (or a scale and play), a column a factor."""
+    """One row per play (or a scale and play), a column per factor."""
     columns = rating_columns(all_definitions(session, study), extract.old_order)
     rows = islice(rating_table(session, study, extract), 1, None)
     name = view_of(session, study, extract).name
@@ -485,14 +485,14 @@ def answers_table(session: Session, study: Study, extract: Extract) -> ExportTab
 
 
 def runs_table(session: Session, study: Study, extract: Extract) -> ExportTable:
-    """One row a visit, a column a question of the forms."""
+    """One row per visit, a column a question of the forms."""
     forms, number = form_columns(all_definitions(session, study)), run_count(session, study, extract)
     rows = check_whole(run_rows(session, study, extract, forms), number)
     return ExportTable("runs", run_columns(forms, extract.old_order), rows, number)
 
 
 def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
-    """One row a visit, a column a cell with the mean rating in it; InputError for trials without a scale."""
+    """One row per visit, a column per cell with its mean rating; InputError for trials without a scale."""
     definitions, number = all_definitions(session, study), run_count(session, study, extract)
     newest, forms = definition_of_series(session, study, extract.series), form_columns(definitions)
     rows = check_whole(wide_rows(session, study, extract, newest, forms), number)

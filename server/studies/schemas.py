@@ -123,7 +123,7 @@ class EditedDefinition(BaseModel):
 
 
 class LevelsTable(RequestBody):
-    """A CSV with one row a clip: column `file`, then one column a factor; `exemplar` is optional."""
+    """A CSV with one row per clip: column `file`, then one column per factor; `exemplar` is optional."""
 
     csv: Annotated[str, StringConstraints(max_length=2_000_000)]
 

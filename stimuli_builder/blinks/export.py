@@ -165,7 +165,7 @@ GAZE_COLUMNS = {
 
 
 def to_csv(curve: AnimationCurve) -> str:
-    """One row a frame, columns as in `CSV_COLUMNS`, then the gaze if there is one."""
+    """One row per frame, columns as in `CSV_COLUMNS`, then the gaze if there is one."""
     lids = [curve.left, curve.right, curve.lower_up_mm, curve.lower_nasal_mm]
     gaze = () if curve.gaze_deg is None else curve.gaze_deg.T
     rows = [

@@ -235,7 +235,7 @@ def resample(profile: BlinkProfile, duration_frames_30fps: float) -> BlinkProfil
     return resample_phases(profile, *split_duration(duration_frames_30fps, profile.down_fraction))
 
 
-# Profiles on disk: one row a sample at 300 fps, its place counted from the blink's minimum.
+# Profiles on disk: one row per sample at 300 fps, its place counted from the blink's minimum.
 
 EYES: dict[str, Eye | None] = {"left": "left", "right": "right", "both": "both", "": None}
 TABLE_COLUMNS = {

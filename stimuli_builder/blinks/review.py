@@ -96,7 +96,7 @@ def _frame(values: dict[str, object], name: str, number: int, path: Path) -> int
 
 
 def write_reviews(path: Path, reviews: Sequence[Review]) -> None:
-    """Write all decisions, one row a blink; the columns of moved ends only where an end was moved."""
+    """Write all decisions, one row per blink; the columns of moved ends only where an end was moved."""
     with whole_file(path) as partial:
         columns = [field.name for field in fields(Review)]
         table = pd.DataFrame([asdict(review) for review in reviews], columns=columns)

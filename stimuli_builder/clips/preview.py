@@ -43,7 +43,7 @@ def write_preview(manifest: Manifest, folder: Path) -> tuple[Path, Path]:
 
 
 def contact_sheet(manifest: Manifest, folder: Path) -> Rgb:
-    """One row a cell: the blink of its first exemplar, frame by frame."""
+    """One row per cell: the blink of its first exemplar, frame by frame."""
     firsts = [next(clips) for _, clips in groupby(manifest.clips, key=lambda clip: clip.cell)]
     rows = [[thumbnail(frame) for frame in blink_frames(folder / clip.file, clip)] for clip in firsts]
     columns, width = max(map(len, rows)), max(frame.width for frames in rows for frame in frames)

@@ -305,7 +305,7 @@ def of_trace(changes: Changes) -> list[str]:
 
 
 def rows_of_film(plays: Sequence[PlayOnScreen]) -> list[tuple[object, ...]]:
-    """One row a frame, as in COLUMNS."""
+    """One row per frame, as in COLUMNS."""
     return [
         (number, onset.frame, *(round(value, 3) for value in (onset.at_ms, onset.within_ms, interval, late)))
         for number, play in enumerate(plays, start=1)

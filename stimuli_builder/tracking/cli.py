@@ -99,7 +99,7 @@ def track(
     Without labels a face detector finds the eyes and trains the model (its environment, 270 MB, is made at
     first use); labels placed by hand (--labels) are more exact.
 
-    Writes one row a frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (sides
+    Writes one row per frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (sides
     of the picture: left is the person's right eye, unless it is mirrored; with --one-eye 9 points and
     distance_px), residual, iterations, error_px, e01 ... e18, status, reason. A frame
     that cannot be fitted has empty points, the status 'lost' and its reason; one that may be wrong is
@@ -256,8 +256,8 @@ def label(
 ) -> None:
     """Propose labels for varied frames with the eye detector, for correction by hand.
 
-    The detector's environment (270 MB) is made at first use. Upper-lid points of half-closed lids can be 1
-    to 2 pixels off: review every frame on the labeling page before training.
+    The detector's environment (270 MB) is installed on first use. Upper-lid points of half-closed lids can be
+    1 to 2 pixels off: review every frame on the labeling page before training.
 
     Examples:
 

@@ -17,7 +17,7 @@ from experiments.files import whole_text
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points
 from table_files.open import named_rows
 
-# The track table: one row a frame, written as tracking goes, read back column by column.
+# The track table: one row per frame, written as tracking goes, read back column by column.
 
 COLUMN_MEANINGS = {
     "frame": "frame number from 0",

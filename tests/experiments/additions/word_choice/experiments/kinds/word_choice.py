@@ -62,7 +62,7 @@ KIND = Kind(
     answer=WordAnswer,
     view=View(
         "words",
-        "Words: one row a play",
+        "Words: one row per play",
         answer_columns(base.CLIP, ANSWER),
         rows_of("word_choice", {"shown": "c"}),
     ),
