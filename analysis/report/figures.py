@@ -36,8 +36,7 @@ from analysis.report.pictures import (
     write_note,
 )
 from analysis.traces import LagResult, MeanTrace
-from analysis.within.anova import AnovaResult
-from analysis.within.estimates import margin, margin_of
+from analysis.within.estimates import group_membership, margin, margin_of
 from analysis.within.simple_effects import SIGNIFICANCE
 from experiments.declaration.trial import RatedScale
 from experiments.error_bars import within_participant_errors
@@ -269,7 +268,7 @@ def _arranged(analysis: Analysis, spec: FigureSpec) -> _Shown:
     sizes = [len(levels[name]) for name in of_margin.names]
     order = [of_margin.names.index(name) for name in named]
     members = tuple(m for m, name in enumerate(result.factors) if name in named)
-    own = _by_group(result, [name for name in of_margin.names if name not in result.factors])
+    own = group_membership(result, [name for name in of_margin.names if name not in result.factors])
     # Times 1 or NaN: each participant has values only in the columns of the own group.
     values = (own[:, :, None] * margin(result, members)[:, None, :]).reshape(-1, *sizes)
     means = of_margin.means.reshape(sizes)
@@ -295,20 +294,6 @@ def _arranged(analysis: Analysis, spec: FigureSpec) -> _Shown:
         groups,
         shades,
     )
-
-
-def _by_group(result: AnovaResult, factors: Sequence[str]) -> Floats:
-    """1 in the own group of a participant, NaN in others: (N, groups) of these factors between people."""
-    design = result.between
-    at = [design.factors.index(name) for name in factors]
-    sizes = [len(design.levels[k]) for k in at]
-    own = np.zeros(result.n_participants, np.int64)
-    # Without factors between participants everyone is in the one group, 0.
-    if at:
-        own = np.ravel_multi_index(tuple(design.codes[:, k] for k in at), sizes).astype(np.int64)
-    marks = np.full((result.n_participants, int(np.prod(sizes, initial=1))), np.nan)
-    marks[np.arange(len(own)), own] = 1.0
-    return marks
 
 
 def _name(analysis: Analysis, levels: dict[str, str]) -> str:

@@ -167,3 +167,17 @@ def means_of(margin: Margin, confidence: float = 0.95) -> list[MarginalMean]:
         MarginalMean(name, levels, float(m), float(se), (float(m - reach * se), float(m + reach * se)))
         for levels, m, se in zip(margin.combinations, means, errors, strict=True)
     ]
+
+
+def group_membership(result: AnovaResult, factors: Sequence[str]) -> Floats:
+    """1 in the own group of a participant, NaN in others: (N, groups) of these factors between people."""
+    design = result.between
+    at = [design.factors.index(name) for name in factors]
+    sizes = [len(design.levels[k]) for k in at]
+    own = np.zeros(result.n_participants, np.int64)
+    # Without factors between participants everyone is in the one group, 0.
+    if at:
+        own = np.ravel_multi_index(tuple(design.codes[:, k] for k in at), sizes).astype(np.int64)
+    marks = np.full((result.n_participants, int(np.prod(sizes, initial=1))), np.nan)
+    marks[np.arange(len(own)), own] = 1.0
+    return marks
