@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from math import isnan
 
 from analysis.pairs.abilities import Contrast, PairsResult
 from analysis.pairs.intervals import QuestionPair
@@ -321,10 +322,22 @@ def means_table(result: ThresholdsResult, name: str, synthetic: bool = False) ->
     notes = (
         "Mean of the individual thresholds, weighted by their errors (random effects by REML, "
         "Hartung-Knapp interval). SD: between-person standard deviation of thresholds.",
+        *_same_threshold(result),
         *_without_threshold(result),
     )
     title = caption("Thresholds, mean over people", name, synthetic)
     return Table("threshold-means", title, header, rows, 1, notes)
+
+
+def _same_threshold(result: ThresholdsResult) -> list[str]:
+    """Conditions whose people all have one threshold, which gives the mean no standard error."""
+    return [
+        f"{mean.condition}: all {mean.people} people have the same threshold, so the mean has no standard "
+        "error. Their answers change at the same levels, whose distance limits the precision. Report the "
+        "interval of single people, or show levels in between."
+        for mean in result.means
+        if isnan(mean.se)
+    ]
 
 
 def _without_threshold(result: ThresholdsResult) -> list[str]:
@@ -480,6 +493,12 @@ def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, syn
         f"Threshold: {variables[0]} at {variables[1]} = {middle:g}. Tilt: change of the threshold per unit "
         f"of {variables[1]}.",
         *_of_people(result),
+        *(
+            f"{condition}: all people have the same {name}, so the mean has no interval."
+            for condition, means in result.means.items()
+            for name, one in (("threshold", means.threshold), ("tilt", means.tilt))
+            if one is not None and isnan(one.se)
+        ),
     )
     title = caption("Thresholds over two variables", name, synthetic)
     return Table("thresholds", title, header, tuple(rows), 1, notes)

@@ -19,7 +19,7 @@ from analysis.report.choice_tables import (
 from analysis.report.contents import Contents, Part, Picture, caption
 from analysis.report.formats import Table
 from analysis.report.json_output import exclusions_data, left_out, study_data
-from analysis.report.numbers import apa_p, decimals, fixed, interval, p_value, share
+from analysis.report.numbers import DASH, apa_p, decimals, fixed, interval, p_value, share
 from analysis.report.r_models import threshold_files
 from analysis.thresholds.likelihood import function
 from analysis.thresholds.people import ThresholdsResult
@@ -198,10 +198,12 @@ def sentences(
         # A mean exists only where several people have a threshold.
         if label in means:
             mean = means[label]
-            low, high = fixed(mean.ci_low, digits), fixed(mean.ci_high, digits)
+            bounds = interval((mean.ci_low, mean.ci_high), digits)
+            # Without a standard error there is no interval.
+            sure = "the same for all of them" if bounds == DASH else f"95% CI {bounds}"
             said.append(
                 f"{label}: the mean threshold of {mean.people} people ({CRITERION}) was "
-                f"{fixed(mean.mean, digits)}{unit}, 95% CI [{low}, {high}]."
+                f"{fixed(mean.mean, digits)}{unit}, {sure}."
             )
         else:
             said.append(

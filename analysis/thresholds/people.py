@@ -18,7 +18,10 @@ from experiments.errors import InputError
 
 @dataclass(frozen=True)
 class Average:
-    """Mean of estimates with known errors over people; see `average`."""
+    """Mean of estimates with known errors over people; see `average`.
+
+    `se` and its interval are NaN where all people have the same estimate.
+    """
 
     people: int
     mean: float
@@ -26,6 +29,10 @@ class Average:
     ci_low: float
     ci_high: float
     tau: float
+
+
+EQUAL = 1e-6
+"""Estimates that vary this little, in squares of their errors, are equal: fits end at about 1e-8."""
 
 
 def average(y: Array, errors: Array) -> Average | None:
@@ -41,7 +48,8 @@ def average(y: Array, errors: Array) -> Average | None:
         \mathrm{se}^2 &= \textstyle\sum_i w_i (y_i - \hat\mu)^2 / \{(k - 1) \sum_i w_i\} \tag{3}
 
     with y_i a person's estimate, s_i its standard error, mu the weighted mean and k the people; (3), with
-    t on k - 1 df, is Hartung and Knapp's (2001).
+    t on k - 1 df, is Hartung and Knapp's (2001). If all y_i are equal it would be 0, a certainty that people
+    who switch between the same two levels do not give: then it and the interval are NaN.
     """
     if len(y) < 2:
         return None
@@ -67,7 +75,8 @@ def average(y: Array, errors: Array) -> Average | None:
     weights = 1 / (s2 + tau2)
     mean = float(np.sum(weights * y) / weights.sum())
     count = len(y)
-    se = float(np.sqrt(np.sum(weights * (y - mean) ** 2) / ((count - 1) * weights.sum())))
+    variation = float(np.sum(weights * (y - mean) ** 2)) / (count - 1)
+    se = float(np.sqrt(variation / weights.sum())) if variation > EQUAL else float("nan")
     half = float(stats.t.ppf(0.975, count - 1)) * se
     return Average(count, mean, se, mean - half, mean + half, float(np.sqrt(tau2)))
 

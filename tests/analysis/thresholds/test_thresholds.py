@@ -148,6 +148,22 @@ def test_the_mean_over_people_weighs_by_precision() -> None:
     assert same.mean == pytest.approx(2.0, abs=1e-4)
 
 
+def test_people_who_all_change_at_one_level_give_the_mean_no_interval(tmp_path: Path) -> None:
+    # Hartung and Knapp's error is the spread of the estimates: 0, whatever the single people's intervals are.
+    lines = ["id,x,yes"]
+    lines += [f"p{p},{x},{int(x > 3)}" for p in range(8) for x in (1, 2, 3, 4, 5) for _ in range(10)]
+    file, out = tmp_path / "same.csv", tmp_path / "same.json"
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    named = ["thresholds", str(file), "--participant", "id", "--x", "x", "--response", "yes"]
+    ended = CliRunner().invoke(app, [*named, "--json", str(out)])
+    assert ended.exit_code == 0, ended.output
+    said = " ".join(ended.output.split())
+    assert "all: all 8 people have the same threshold, so the mean has no standard error." in said
+    (mean,) = json.loads(out.read_text(encoding="utf-8"))["means"]
+    assert (mean["se"], mean["ci_low"], mean["ci_high"]) == (None, None, None)
+    assert mean["mean"] == pytest.approx(3.5, abs=0.02)
+
+
 def test_the_command_writes_pooled_people_and_means(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     rows = [
