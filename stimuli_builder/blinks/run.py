@@ -17,7 +17,14 @@ from stimuli_builder.blinks.columns import eye_of
 from stimuli_builder.blinks.csv_table import read_table
 from stimuli_builder.blinks.events.recognise import recognise
 from stimuli_builder.blinks.export import AnimationCurve, CurveTarget, check_format, write_curve
-from stimuli_builder.blinks.extract import EyeBlinks, blinks_of, rate_doubts, why_no_blink, without_blinks
+from stimuli_builder.blinks.extract import (
+    EyeBlinks,
+    blinks_of,
+    rate_doubts,
+    speed_doubt,
+    why_no_blink,
+    without_blinks,
+)
 from stimuli_builder.blinks.labelling import LabelOptions
 from stimuli_builder.blinks.profile import Array, BlinkProfile, write_profile_table
 from stimuli_builder.blinks.review import (
@@ -242,7 +249,7 @@ def _write_text(path: Path, text: str) -> None:
 
 def _doubts(table: pd.DataFrame, eyes: Sequence[EyeBlinks]) -> list[str]:
     """What a track says about its frames, and unlikely rates."""
-    lines = [*without_blinks(eyes), *rate_doubts(eyes), *eyes[0].series.notes]
+    lines = [*without_blinks(eyes), *rate_doubts(eyes), *speed_doubt(eyes), *eyes[0].series.notes]
     # Only tracks of this program have these columns; other tables are read without them.
     lost = int((table["status"] == "lost").sum()) if "status" in table.columns else 0
     if lost:
@@ -292,7 +299,7 @@ def run_blinks(job: BlinksJob) -> None:
     profiles = all_profiles(accepted, job.series.stem, names)
     if not profiles and len(frame):
         raise InputError("the review rejects every blink, so there is nothing to write")
-    for line in asymmetry_lines(eyes, _rejected(decided)):
+    for line in [*asymmetry_lines(eyes, _rejected(decided)), *speed_doubt(eyes)]:
         sys.stderr.write(f"note: {line}\n")
     summaries = [
         summarise(eye, frame, [p for p in profiles if p.eye == name and _is_of(p, eye)])

@@ -170,8 +170,13 @@ def series_fps(table: pd.DataFrame, fps: float | None, path: Path, *, uneven: bo
         _refuse_contradiction(fps, measured, table, path)
     rate = measured if measured is not None else fps
     if rate is None or rate < 10:
+        # Milliseconds in a column of seconds give a rate that is a thousand times too low.
+        hint = ""
+        if rate is not None and measured is not None and TOLD_FPS[0] <= 1000 * rate <= TOLD_FPS[1]:
+            hint = f". If the times are in ms, name the column time_ms ({1000 * rate:.4g} frames per second)"
         raise InputError(
-            f"{path.name}: at {rate:.3g} frames per second blinks cannot be detected; at least 10 are needed"
+            f"{path.name}: at {rate:.3g} frames per second blinks cannot be detected; at least 10 are "
+            f"needed{hint}"
         )
     return rate
 
@@ -184,11 +189,29 @@ def are_uneven(table: pd.DataFrame) -> bool:
     return rising and bool((np.abs(steps - np.median(steps)) > _allowed_s(times, steps)).any())
 
 
+def _out_of_order(times: Array, step: int, table: pd.DataFrame, path: Path) -> str:
+    """What is wrong with the first step that does not go forward, and what to do."""
+    before, after = times[step], times[step + 1]
+    name, line = _name(table), line_of(path, step + 1)
+    if not np.isfinite([before, after]).all():
+        missing = line if np.isfinite(before) else line_of(path, step)
+        return f"{path.name}: line {missing} has no {name}; add the time, or remove the row"
+    does = "repeats the time of the row before" if after == before else "goes back in time"
+    return (
+        f"{path.name}: {name} must increase from row to row, but line {line} {does} ({before:g}, then "
+        f"{after:g} s). Remove repeated rows, or sort the rows; measure recordings with different clocks "
+        "one by one"
+    )
+
+
 def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:
     times = pd.to_numeric(table["time_s"], errors="coerce").to_numpy(dtype=np.float64)
     steps = np.diff(times)
-    if steps.size == 0 or not np.isfinite(steps).all() or (steps <= 0).any():
-        raise InputError(f"{path.name}: {_name(table)} must be complete and increase from row to row")
+    if steps.size == 0:
+        raise InputError(f"{path.name} has {len(times)} frame, which is too short")
+    # NaN compares as false, so that a missing time is found, too.
+    if (wrong := ~(steps > 0)).any():
+        raise InputError(_out_of_order(times, int(np.argmax(wrong)), table, path))
     off = np.abs(steps - np.median(steps)) > _allowed_s(times, steps)
     if not uneven and off.any():
         line = line_of(path, int(np.argmax(off)) + 1)  # a step ends at the second of two rows

@@ -198,3 +198,41 @@ def test_a_table_of_one_row_is_refused_as_one(stimuli, tmp_path):
     ended = stimuli("blinks", tmp_path / "one.csv", "--out", tmp_path / "out.csv")
     assert ended.code == 2
     assert "expected two frames or more, got a table of one row" in " ".join(ended.err.split())
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda times: times.__setitem__(30, times[29]), "line 32 repeats the time of the row before"),
+        (lambda times: times.__setitem__(slice(60, None), times[60:] - 0.5), "line 62 goes back in time"),
+        (
+            lambda times: times.__setitem__(40, np.nan),
+            "line 42 has no time_s; add the time",
+        ),
+        (lambda times: times.__imul__(1000), r"If the times are in ms, name the column time_ms \(60 frames"),
+    ],
+)
+def test_times_that_cannot_be_are_refused_with_their_line(tmp_path: Path, change, said: str) -> None:
+    times = np.arange(120) / 60
+    change(times)
+    with pytest.raises(InputError, match=said):
+        read_series(written(tmp_path / "s.csv", times, np.linspace(20, 30, 120)))
+
+
+@pytest.mark.parametrize(("fps", "low", "high"), [(24, -0.37, -0.25), (30, -0.27, -0.15), (240, -0.08, 0.0)])
+def test_few_frames_flatten_the_peak_velocity_and_the_screen_says_so(
+    stimuli, tmp_path: Path, fps: int, low: float, high: float
+) -> None:
+    # By hand: a half cosine of amplitude A in T seconds is fastest in its middle, A pi / (2 T).
+    times, random = np.arange(round(30 * fps)) / fps, np.random.default_rng(1)
+    since = (times - 1.013) % 2.57
+    closing = np.where(since < 0.1, 12.5 * (1 - np.cos(np.pi * since / 0.1)), 25.0)
+    opening = np.where(since < 0.38, 12.5 * (1 + np.cos(np.pi * (since - 0.13) / 0.25)), 0.0)
+    values = 30 - np.where(since < 0.13, closing, opening) + random.normal(0, 0.2, times.size)
+    path = written(tmp_path / "s.csv", times, values)
+    ended = stimuli("blinks", path, "--out", tmp_path / "b.csv", "--report", tmp_path / "r.html")
+    assert ended.code == 0, ended.err
+    velocity = pd.read_csv(tmp_path / "b.csv")["peak_closing_velocity"].median()
+    assert low < velocity / (25 * np.pi / 2 / 0.1) - 1 < high
+    for said in (ended.err, (tmp_path / "r.html").read_text(encoding="utf-8")):
+        assert ("peak closing velocities are too low" in said) == (fps < 60)
