@@ -14,6 +14,7 @@ from analysis.thresholds.likelihood import Interval
 from analysis.thresholds.people import Average, PersonThreshold, ThresholdsResult
 from analysis.thresholds.plane import Plane
 from analysis.thresholds.plane_people import PersonPlane, PlanesResult, PopulationPlane
+from analysis.thresholds.psychometric import FALLS
 
 # Paired comparisons as tables and words.
 
@@ -493,6 +494,8 @@ def _parameters(result: PlanesResult, variables: tuple[str, str], name: str, syn
         f"Threshold: {variables[0]} at {variables[1]} = {middle:g}. Tilt: change of the threshold per unit "
         f"of {variables[1]}.",
         *_of_people(result),
+        # With a guess rate answers count as correct, and better answers at less of x may be a mistake.
+        *(f"{condition}: {FALLS}." for condition, fit in result.pooled.items() if fit.guess and fit.falling),
         *(
             f"{condition}: all people have the same {name}, so the mean has no interval."
             for condition, means in result.means.items()

@@ -113,6 +113,22 @@ def test_the_command_fits_people_and_their_means(tmp_path: Path) -> None:
     assert "Threshold along asymmetry" in done.output
 
 
+@pytest.mark.parametrize("falling", [False, True])
+def test_a_plane_with_a_guess_rate_says_that_its_function_falls(tmp_path: Path, falling: bool) -> None:
+    rows, rng = ["duration,asymmetry,correct"], np.random.default_rng(4)
+    for _ in range(500):
+        x, z = rng.uniform(200, 440), rng.uniform(0, 1)
+        chance = 0.5 + 0.5 / (1 + np.exp(-(x - 320 - 80 * (z - 0.5)) / 25 * (-1 if falling else 1)))
+        rows.append(f"{x:.0f},{z:.2f},{int(rng.uniform() < chance)}")
+    file = tmp_path / "trials.csv"
+    file.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    options = ["--x", "duration", "--second", "asymmetry", "--response", "correct", "--guess", "0.5"]
+    done = CliRunner().invoke(app, ["thresholds", str(file), *options])
+    assert done.exit_code == 0, done.output
+    said = "correct answers become rarer as x increases: the function falls."
+    assert (said in " ".join(done.output.split())) == falling
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
