@@ -54,6 +54,13 @@ def run_count(session: Session, study: Study, extract: Extract) -> int:
     return session.scalar(select(func.count()).select_from(StudyRun).where(extract.condition(study))) or 0
 
 
+def answered_versions(session: Session, study: Study, extract: Extract) -> Sequence[StudyVersion]:
+    """The versions that these runs are of, newest first."""
+    runs = select(StudyRun.version_id).where(extract.condition(study))
+    query = select(StudyVersion).where(StudyVersion.id.in_(runs)).order_by(StudyVersion.number.desc())
+    return session.scalars(query).all()
+
+
 def first_start(session: Session, study: Study, extract: Extract) -> datetime | None:
     """When the first of these runs started; None where there are none."""
     return session.scalar(select(func.min(StudyRun.started_at)).where(extract.condition(study)))

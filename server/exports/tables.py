@@ -36,7 +36,7 @@ from server.models import NO_SLOT, Study, StudyRun
 from server.participation.judgement import judge_run
 from server.participation.visit_repository import calibrations
 from server.results import runs
-from server.studies.lookup import all_definitions
+from server.studies.lookup import all_definitions, definition_of
 from server.studies.series import definition_of_series
 
 # Questionnaire answers as columns: one per question, or one per option if several may be chosen.
@@ -206,7 +206,9 @@ OF_THE_RUN = (
 _STUMBLES_AT = "clear constructor delete entries forEach get has keys row_id set size values"
 _TAKEN = frozenset((*(column.name for column in RUN_COLUMNS), *_STUMBLES_AT.split()))
 Levels = tuple[str, ...]
-Means = dict[tuple[str, Levels], float]
+Place = frozenset[tuple[str, str]]
+"""Factors and their levels: versions with other factors, or in another order, have other places."""
+Means = dict[tuple[str, Place], float]
 
 
 def beside_runs(factor: str) -> str:
@@ -221,10 +223,33 @@ class Cell:
     scale: str
     levels: Levels
     column: Column
+    place: Place
 
 
-def cells_of(experiment: Experiment) -> list[Cell]:
-    """The columns of means, scale by scale, cells in declared order."""
+def cells_of(experiment: Experiment, earlier: Sequence[Experiment] = ()) -> list[Cell]:
+    """The columns of means, scale by scale, cells in declared order; then those of earlier versions alone.
+
+    A cell of several versions has one column, whose range is that of all their scales.
+    """
+    taken = {name.casefold() for name in _TAKEN}
+    cells = {(cell.scale, cell.place): cell for cell in _cells(experiment, taken)}
+    for version in earlier:
+        for cell in _cells(version, set(taken)) if scales_of(version) else ():
+            key = (cell.scale, cell.place)
+            if key not in cells:
+                name = unlike(cell.column.name, taken)
+                cells[key] = replace(cell, column=replace(cell.column, name=name))
+            cells[key] = replace(cells[key], column=_of_both(cells[key].column, cell.column))
+    return list(cells.values())
+
+
+def _of_both(one: Column, other: Column) -> Column:
+    """The column with a range that holds the answers of both; scales have both ends."""
+    low, high = ([getattr(each, end) for each in (one, other)] for end in ("minimum", "maximum"))
+    return replace(one, minimum=min(low), maximum=max(high))
+
+
+def _cells(experiment: Experiment, taken: set[str]) -> list[Cell]:
     scales = scales_of(experiment)
     if not scales:
         raise InputError(
@@ -237,7 +262,6 @@ def cells_of(experiment: Experiment) -> list[Cell]:
         for factor in within
     ]
     cells: list[Cell] = []
-    taken = {name.casefold() for name in _TAKEN}
     for scale in scales:
         for levels in product(*rated):
             name = unlike("_".join((scale.name, *(plain_name(one.name) for one in levels))), taken)
@@ -245,7 +269,8 @@ def cells_of(experiment: Experiment) -> list[Cell]:
             column = Column(
                 name, "number", _mean_of(scale, said), minimum=scale.minimum, maximum=scale.maximum
             )
-            cells.append(Cell(scale.name, tuple(one.name for one in levels), column))
+            place = frozenset((f.name, one.name) for f, one in zip(within, levels, strict=True))
+            cells.append(Cell(scale.name, tuple(one.name for one in levels), column, place))
     return cells
 
 
@@ -255,7 +280,10 @@ def _mean_of(scale: RatedScale, cell: str) -> str:
 
 
 def wide_columns(
-    experiment: Experiment, forms: Sequence[FormColumn], old_order: bool = False
+    experiment: Experiment,
+    forms: Sequence[FormColumn],
+    old_order: bool = False,
+    earlier: Sequence[Experiment] = (),
 ) -> list[Column]:
     """The run, its groups, its answers to forms, how many answers are averaged, and a column per cell."""
     of_forms = {one.column.name for one in forms}
@@ -274,7 +302,7 @@ def wide_columns(
     number = Column(
         "answers", "integer", "Number of answers in main trials that the means are based on.", minimum=0
     )
-    return [*kept, *between, number, *(cell.column for cell in cells_of(experiment))]
+    return [*kept, *between, number, *(cell.column for cell in cells_of(experiment, earlier))]
 
 
 def wide_rows(
@@ -283,9 +311,10 @@ def wide_rows(
     extract: Extract,
     experiment: Experiment,
     forms: Sequence[FormColumn],
+    earlier: Sequence[Experiment] = (),
 ) -> Iterator[list[Any]]:
     """Rows in the order the runs began; a cell is empty where the run has no answer in it."""
-    cells = cells_of(experiment)
+    cells = cells_of(experiment, earlier)
     names = [column.name for column in run_columns(forms, extract.old_order)]
     kept = [
         names.index(column.name)
@@ -295,7 +324,7 @@ def wide_rows(
     between = [factor.name for factor in experiment.factors if factor.between]
     at = names.index("run")
     # Both are in the order the runs began, so that the answers of one run are in memory at a time.
-    answered = _by_run(session, study, extract, experiment)
+    answered = _by_run(session, study, extract, [experiment, *earlier])
     coming = next(answered, None)
     for row in run_rows(session, study, extract, forms):
         mine = _NOTHING
@@ -305,7 +334,7 @@ def wide_rows(
             *(row[index] for index in kept),
             *(mine.groups.get(name, "") for name in between),
             mine.count,
-            *(mine.means.get((cell.scale, cell.levels), "") for cell in cells),
+            *(mine.means.get((cell.scale, cell.place), "") for cell in cells),
         ]
     if coming is not None:
         raise ExportBrokenOff(f"the export failed: answers of the run {coming.run} remain; try again")
@@ -324,32 +353,37 @@ class _RunMeans:
 _NOTHING = _RunMeans("", {}, 0, {})
 
 
-def _by_run(session: Session, study: Study, extract: Extract, experiment: Experiment) -> Iterator[_RunMeans]:
-    """The runs with rows of main trials, in the order they began."""
+def _by_run(
+    session: Session, study: Study, extract: Extract, experiments: Sequence[Experiment]
+) -> Iterator[_RunMeans]:
+    """The runs with rows of main trials, in the order they began; the first declaration has the groups."""
     factors, view = factor_names(session, study), view_of(session, study, extract)
     header = view.csv_header(factors)
-    within = [header.index(factor.name) for factor in experiment.factors if not factor.between]
-    between = {factor.name: header.index(factor.name) for factor in experiment.factors if factor.between}
+    between = {factor.name: header.index(factor.name) for factor in experiments[0].factors if factor.between}
+    of_cells = {factor.name for one in experiments for factor in one.factors if not factor.between}
+    within = {name: header.index(name) for name in of_cells if name not in between}
     run, kind, trial, scale, response = (
         header.index(name) for name in ("run", "kind", "trial_index", "scale", "response")
     )
     rows = (view.csv_row(stored, factors) for stored in rating_rows(session, study, extract))
     for name, mine in groupby((row for row in rows if row[kind] == "main"), key=itemgetter(run)):
-        last: dict[tuple[Any, str], tuple[Levels, float]] = {}
+        last: dict[tuple[Any, str], tuple[Place, float]] = {}
         for row in mine:
             # Plays come in order: as in the scripts, a later one with an answer takes the place of an earlier
             # one of its trial; a later one without an answer leaves the earlier standing.
             if row[response] is not None:
-                levels = tuple(str(row[index]) for index in within)
-                last[row[trial], row[scale]] = (levels, float(row[response]))
+                # Factors of other versions are empty.
+                levels = ((name, row[index]) for name, index in within.items())
+                place = frozenset((name, str(level)) for name, level in levels if level not in (None, ""))
+                last[row[trial], row[scale]] = (place, float(row[response]))
         groups = {factor: str(row[index]) for factor, index in between.items()}
         yield _RunMeans(name, groups, len(last), _means(last))
 
 
-def _means(answers: dict[tuple[Any, str], tuple[Levels, float]]) -> Means:
-    values: dict[tuple[str, Levels], list[float]] = defaultdict(list)
-    for (_, scale), (levels, response) in answers.items():
-        values[scale, levels].append(response)
+def _means(answers: dict[tuple[Any, str], tuple[Place, float]]) -> Means:
+    values: dict[tuple[str, Place], list[float]] = defaultdict(list)
+    for (_, scale), (place, response) in answers.items():
+        values[scale, place].append(response)
     return {cell: round(sum(each) / len(each), 6) for cell, each in values.items()}
 
 
@@ -404,7 +438,8 @@ def explained_tables(
         ("Runs: one row per visit", run_columns(forms, old_order)),
     ]
     if scales_of(active):
-        cells = [column for column in wide_columns(active, forms, old_order) if column not in tables[1][1]]
+        every = wide_columns(active, forms, old_order, definitions[-2::-1])
+        cells = [column for column in every if column not in tables[1][1]]
         title = "Wide: one row per visit; the columns of the runs, plus one column per cell of the design"
         tables.append((title, cells))
     return tables
@@ -495,8 +530,10 @@ def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     """One row per visit, a column per cell with its mean rating; InputError for trials without a scale."""
     definitions, number = all_definitions(session, study), run_count(session, study, extract)
     newest, forms = definition_of_series(session, study, extract.series), form_columns(definitions)
-    rows = check_whole(wide_rows(session, study, extract, newest, forms), number)
-    return ExportTable("wide", wide_columns(newest, forms, extract.old_order), rows, number)
+    # Answers of another data series may lie in cells that the newest declaration no longer has.
+    earlier = [definition_of(version) for version in repository.answered_versions(session, study, extract)]
+    rows = check_whole(wide_rows(session, study, extract, newest, forms, earlier), number)
+    return ExportTable("wide", wide_columns(newest, forms, extract.old_order, earlier), rows, number)
 
 
 TABLES: dict[TableName, Callable[[Session, Study, Extract], ExportTable]] = {

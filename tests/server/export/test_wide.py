@@ -1,6 +1,7 @@
 import csv
 import io
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,9 +15,11 @@ from server.exports.psych_ds import LANGUAGES, script
 from server.exports.schemas import EVERYTHING
 from server.exports.tables import cells_of, form_columns
 from server.models import Study
+from server.studies.creation import add_version, store_clips
 from tests.conftest import REPOSITORY
 from tests.helpers.admins import Admin
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase, add_study
+from tests.helpers.tiny_clips import make_clip_folder
 from tests.server.trials.test_comparisons import PAIRS
 
 
@@ -51,6 +54,43 @@ def test_a_visit_without_answers_has_empty_cells(viewer: Admin, participant: Par
     [row] = rows_of(viewer, "wide.csv")
     assert row["answers"] == "0"
     assert row["rating_a_slow"] == row["form_about_age"] == ""
+
+
+def test_answers_of_an_earlier_data_series_keep_their_columns(
+    viewer: Admin, study: StudyInDatabase, participant: Participant, tmp_path: Path
+) -> None:
+    participant.agree()
+    participant.rate_all()
+    text = SHORT.replace('name = "fast"', 'name = "quick"')
+    changed, services = parse_experiment(text), study.services
+    manifest = make_clip_folder(changed, tmp_path / "changed", frames=4)
+    store_clips(services.clips, manifest, tmp_path / "changed")
+    with services.database.write() as session:
+        add_version(session, session.query(Study).one(), text, changed, manifest, None)
+    later = Participant(participant.client, participant.link)
+    later.agree()
+    later.rate_all()
+    first, second = rows_of(viewer, "wide.csv")
+    assert [row["data_series"] for row in (first, second)] == ["1", "2"]
+    rated = [
+        {name for name, value in row.items() if name.startswith("rating_") and value}
+        for row in (first, second)
+    ]
+    assert rated[0] == {"rating_a_slow", "rating_a_fast", "rating_b_slow", "rating_b_fast"}
+    assert rated[1] == {"rating_a_slow", "rating_a_quick", "rating_b_slow", "rating_b_quick"}
+    assert "| rating_a_fast | number |" in viewer.get("/studies/short/data/codebook.md").text
+    [alone] = rows_of(viewer, "wide.csv?series=2")
+    assert "rating_a_fast" not in alone
+
+
+def test_a_cell_of_two_scales_has_the_range_of_both() -> None:
+    older, newer = (
+        parse_experiment(SHORT.replace("[trial.scale]", f"[trial.scale]\nmaximum = {most}"))
+        for most in (9, 5)
+    )
+    cells = cells_of(newer, [older])
+    assert [cell.column.name for cell in cells] == [cell.column.name for cell in cells_of(newer)]
+    assert {(cell.column.minimum, cell.column.maximum) for cell in cells} == {(1, 9)}
 
 
 def test_each_visit_has_its_own_means_and_one_is_in_memory_at_a_time(
