@@ -206,9 +206,9 @@ OF_THE_RUN = (
 _STUMBLES_AT = "clear constructor delete entries forEach get has keys row_id set size values"
 _TAKEN = frozenset((*(column.name for column in RUN_COLUMNS), *_STUMBLES_AT.split()))
 Levels = tuple[str, ...]
-Place = frozenset[tuple[str, str]]
-"""Factors and their levels: versions with other factors, or in another order, have other places."""
-Means = dict[tuple[str, Place], float]
+FactorLevels = frozenset[tuple[str, str]]
+"""Factors and their levels: versions with other factors, or in another order, have other cells."""
+Means = dict[tuple[str, FactorLevels], float]
 
 
 def beside_runs(factor: str) -> str:
@@ -223,7 +223,7 @@ class Cell:
     scale: str
     levels: Levels
     column: Column
-    place: Place
+    factor_levels: FactorLevels
 
 
 def cells_of(experiment: Experiment, earlier: Sequence[Experiment] = ()) -> list[Cell]:
@@ -232,10 +232,10 @@ def cells_of(experiment: Experiment, earlier: Sequence[Experiment] = ()) -> list
     A cell of several versions has one column, whose range is that of all their scales.
     """
     taken = {name.casefold() for name in _TAKEN}
-    cells = {(cell.scale, cell.place): cell for cell in _cells(experiment, taken)}
+    cells = {(cell.scale, cell.factor_levels): cell for cell in _cells(experiment, taken)}
     for version in earlier:
         for cell in _cells(version, set(taken)) if scales_of(version) else ():
-            key = (cell.scale, cell.place)
+            key = (cell.scale, cell.factor_levels)
             if key not in cells:
                 name = unlike(cell.column.name, taken)
                 cells[key] = replace(cell, column=replace(cell.column, name=name))
@@ -269,8 +269,8 @@ def _cells(experiment: Experiment, taken: set[str]) -> list[Cell]:
             column = Column(
                 name, "number", _mean_of(scale, said), minimum=scale.minimum, maximum=scale.maximum
             )
-            place = frozenset((f.name, one.name) for f, one in zip(within, levels, strict=True))
-            cells.append(Cell(scale.name, tuple(one.name for one in levels), column, place))
+            factor_levels = frozenset((f.name, one.name) for f, one in zip(within, levels, strict=True))
+            cells.append(Cell(scale.name, tuple(one.name for one in levels), column, factor_levels))
     return cells
 
 
@@ -334,7 +334,7 @@ def wide_rows(
             *(row[index] for index in kept),
             *(mine.groups.get(name, "") for name in between),
             mine.count,
-            *(mine.means.get((cell.scale, cell.place), "") for cell in cells),
+            *(mine.means.get((cell.scale, cell.factor_levels), "") for cell in cells),
         ]
     if coming is not None:
         raise ExportBrokenOff(f"the export failed: answers of the run {coming.run} remain; try again")
@@ -367,23 +367,25 @@ def _by_run(
     )
     rows = (view.csv_row(stored, factors) for stored in rating_rows(session, study, extract))
     for name, mine in groupby((row for row in rows if row[kind] == "main"), key=itemgetter(run)):
-        last: dict[tuple[Any, str], tuple[Place, float]] = {}
+        last: dict[tuple[Any, str], tuple[FactorLevels, float]] = {}
         for row in mine:
             # Plays come in order: as in the scripts, a later one with an answer takes the place of an earlier
             # one of its trial; a later one without an answer leaves the earlier standing.
             if row[response] is not None:
                 # Factors of other versions are empty.
                 levels = ((name, row[index]) for name, index in within.items())
-                place = frozenset((name, str(level)) for name, level in levels if level not in (None, ""))
-                last[row[trial], row[scale]] = (place, float(row[response]))
+                factor_levels = frozenset(
+                    (name, str(level)) for name, level in levels if level not in (None, "")
+                )
+                last[row[trial], row[scale]] = (factor_levels, float(row[response]))
         groups = {factor: str(row[index]) for factor, index in between.items()}
         yield _RunMeans(name, groups, len(last), _means(last))
 
 
-def _means(answers: dict[tuple[Any, str], tuple[Place, float]]) -> Means:
-    values: dict[tuple[str, Place], list[float]] = defaultdict(list)
-    for (_, scale), (place, response) in answers.items():
-        values[scale, place].append(response)
+def _means(answers: dict[tuple[Any, str], tuple[FactorLevels, float]]) -> Means:
+    values: dict[tuple[str, FactorLevels], list[float]] = defaultdict(list)
+    for (_, scale), (factor_levels, response) in answers.items():
+        values[scale, factor_levels].append(response)
     return {cell: round(sum(each) / len(each), 6) for cell, each in values.items()}
 
 
