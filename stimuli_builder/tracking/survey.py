@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from experiments.errors import InputError
 from stimuli_builder.tracking.detector.detection import Detection, one_face, overlap
 from stimuli_builder.tracking.detector.mesh import FaceMesh, open_detector
+from stimuli_builder.tracking.glare import opening_shares
 from stimuli_builder.tracking.shapes import EYE_POINTS, Points, eye_axis
 from stimuli_builder.tracking.tracker import UNSEEN
 from stimuli_builder.video import Picture, VideoInfo, frames, rgb
@@ -37,15 +38,19 @@ BESIDE = 0.75
 textures are read nearly as steadily, at times, as an eye that blinks."""
 STEADY_SHARE = 0.75
 """Part of the least limit up to which a look certainly shows the eye, and its surroundings are its own."""
-FAMILIAR, ALIKE = (0.78, 0.90), 0.90
+FAMILIAR, ALIKE = (0.86, 0.90), 0.90
 """Correlation with the surroundings of steady looks from which on an eye is not covered, at the spreads of
-UNSTEADIER; and next to a covered look. Shut eyes have 0.88 or more, squinting ones 0.79 to 0.84; it is 0.4 or
-less under a hand, 0.74 or less under a narrow bar, and 0.55 to 0.85 where a hand or a cheek comes in."""
+UNSTEADIER; and next to a covered look. Shut, half-shut and squinting eyes have 0.90 or more at the best of
+PLACES; it is 0.75 or less under a hand, paper, wood or cloth, and up to 0.85 under skin or where a hand or a
+cheek comes in."""
 UNSTEADIER = (0.065, 0.09)
 """Spreads, hardly more than a shut eye's and as a hand's, between which the correlation needed rises."""
 FELLOW = 1.25
 """Spread of the other eye, in its lower quartiles, from which on it moved too: eyes shut and turn together.
 A small thing over one eye, with familiar surroundings, leaves the other as it was."""
+CLOSED = 0.5
+"""Opening of the other eye, in its upper quartiles, below which it shut too: one that is read unsteadily when
+open is not read less steadily still when shut."""
 WITNESSES = 5
 """So many steady looks must be as familiar: one alone may show a cover as it comes in."""
 RING_WIDE, RING_HIGH = 0.68, 0.42
@@ -55,6 +60,10 @@ RING = np.array([(x, y) for y in DOWN for x in ACROSS if np.hypot(x / RING_WIDE,
 """Where an eye's surroundings are looked at, from the middle of its canthi, in its widths."""
 SMOOTHED = 0.03
 """Blur of the surroundings in eye's widths, so that noise and single lashes count little."""
+PLACES = np.array([(x, y, size) for size in (1, 0.92) for y in (0, -0.05, -0.1) for x in (0, -0.05, 0.05)])
+"""Where surroundings are looked for: shifts along and down, in eye's widths, and size; the first is the eye's
+own. Canthi of a shutting eye are read lower and farther apart, by up to a tenth of its width: surroundings
+looked at from there correlated by as little as 0.66 with the open eye's, and by 0.9 where they lie."""
 IN_PICTURE = 0.4
 """Part of the surroundings that two looks must both show to be compared."""
 COVERED = (
@@ -71,6 +80,7 @@ def covered_frames(
     spreads: Mapping[int, Sequence[float]],
     fewest: int,
     surroundings: Mapping[int, Looks] | None = None,
+    openings: Mapping[int, Values] | None = None,
 ) -> dict[int, str]:
     """Frames that show a covered eye, and that in words.
 
@@ -82,8 +92,10 @@ def covered_frames(
         Frame that shows eyes -> `contour_spread` of each, as part of its width.
     fewest : int
         Frames without a cover that are needed.
-    surroundings : dict of int to float32 array (eyes, cells), optional
+    surroundings : dict of int to float32 array (eyes, places, cells), optional
         Frame -> `surroundings_of` its eyes; without them every unsteady eye is covered.
+    openings : dict of int to float64 array (eyes,), optional
+        Frame -> how wide each eye is open, as part of its width.
 
     Returns
     -------
@@ -98,7 +110,8 @@ def covered_frames(
     numbers = sorted(spreads)
     looks = None if surroundings is None else np.array([surroundings[n] for n in numbers])
     of_eyes = np.array([spreads[n] for n in numbers])
-    flags = covered(of_eyes, np.array(numbers), looks)
+    wide = None if openings is None else np.array([openings[n] for n in numbers])
+    flags = covered(of_eyes, np.array(numbers), looks, wide)
     compared = (_steady(of_eyes).sum(0) >= WITNESSES) & (looks is not None)
     covers = {
         n: (COVERED if compared[flag].all() else UNSTEADY).format(NAMES[tuple(flag.tolist())])
@@ -113,7 +126,12 @@ def covered_frames(
     return covers
 
 
-def covered(spreads: Values, numbers: NDArray[np.int64], surroundings: Looks | None = None) -> Flags:
+def covered(
+    spreads: Values,
+    numbers: NDArray[np.int64],
+    surroundings: Looks | None = None,
+    openings: Values | None = None,
+) -> Flags:
     """Which eye is covered at which look.
 
     Parameters
@@ -122,8 +140,10 @@ def covered(spreads: Values, numbers: NDArray[np.int64], surroundings: Looks | N
         Of each eye, as part of its width.
     numbers : int64 array (looks,)
         Of their frames, ascending.
-    surroundings : float32 array (looks, eyes, cells), optional
+    surroundings : float32 array (looks, eyes, places, cells), optional
         See `surroundings_of`.
+    openings : float64 array (looks, eyes), optional
+        Of each eye, as part of its width.
 
     Returns
     -------
@@ -131,7 +151,10 @@ def covered(spreads: Values, numbers: NDArray[np.int64], surroundings: Looks | N
     """
     # The lower quartile: half of a recording may show a hand without making it usual.
     limits = np.clip(UNUSUAL * np.percentile(spreads, 25, axis=0), LEAST_SPREAD, MAX_SPREAD)
-    alike = _likeness_to_steady(spreads, BESIDE * limits, surroundings)
+    moved = spreads > FELLOW * np.percentile(spreads, 25, axis=0)
+    if openings is not None:
+        moved |= openings < CLOSED * np.percentile(openings, 75, axis=0)
+    alike = _likeness_to_steady(spreads, BESIDE * limits, surroundings, moved)
     above = (spreads > limits) & (alike < np.interp(spreads, UNSTEADIER, FAMILIAR))
     # Looks with others between them that show no eyes are not adjacent.
     steps = np.diff(numbers)
@@ -147,21 +170,21 @@ def _steady(spreads: Values) -> Flags:
     return np.asarray(spreads <= STEADY_SHARE * LEAST_SPREAD)
 
 
-def _likeness_to_steady(spreads: Values, least: Values, surroundings: Looks | None) -> Values:
+def _likeness_to_steady(spreads: Values, least: Values, surroundings: Looks | None, moved: Flags) -> Values:
     """How like steady looks' the surroundings of eyes are whose spread is above `least` (looks, eyes).
 
-    -1 where the recording has too few steady looks, or the other eye is as steady as ever.
+    -1 where the recording has too few steady looks, or the other eye has not `moved` (looks, eyes).
     """
     alike = np.full(spreads.shape, -1.0)
     if surroundings is None:
         return alike
-    unsteady = spreads > FELLOW * np.percentile(spreads, 25, axis=0)
     for eye in range(spreads.shape[1]):
-        steady = surroundings[_steady(spreads)[:, eye], eye]
+        steady = surroundings[_steady(spreads)[:, eye], eye, 0]
         if len(steady) >= WITNESSES:
-            for look in np.flatnonzero((spreads[:, eye] > least[eye]) & unsteady.all(1)):
+            for look in np.flatnonzero((spreads[:, eye] > least[eye]) & moved.all(1)):
                 # The fifth best of them: a single lucky match does not speak for an eye.
-                alike[look, eye] = np.sort(likenesses(surroundings[look, eye], steady))[-WITNESSES]
+                places = (likenesses(one, steady) for one in surroundings[look, eye])
+                alike[look, eye] = max(np.sort(likeness)[-WITNESSES] for likeness in places)
     return alike
 
 
@@ -182,7 +205,7 @@ def likenesses(one: Looks, others: Looks) -> Values:
 
 
 def surroundings_of(picture: Picture, points: Points) -> Looks:
-    """Gray levels around each eye, free of its place, size and turn; NaN beyond the picture.
+    """Gray levels around each eye, free of its place, size and turn, at `PLACES`; NaN beyond the picture.
 
     Parameters
     ----------
@@ -193,12 +216,13 @@ def surroundings_of(picture: Picture, points: Points) -> Looks:
 
     Returns
     -------
-    float32 array (eyes, cells)
+    float32 array (eyes, places, cells)
     """
     looks = []
     for eye in points.reshape(-1, EYE_POINTS, 2):
         along, down, width = eye_axis(eye)
-        at = (eye[0] + eye[5]) / 2 + width * (RING[:, :1] * along + RING[:, 1:] * down)
+        cells = (PLACES[:, None, 2:] * RING + PLACES[:, None, :2]).reshape(-1, 2)
+        at = (eye[0] + eye[5]) / 2 + width * (cells[:, :1] * along + cells[:, 1:] * down)
         last = np.array(picture.shape[1::-1]) - 1
         left, top = np.clip(np.floor(at.min(0)), 0, last).astype(int)
         right, bottom = np.clip(np.ceil(at.max(0)), 0, last).astype(int)
@@ -209,7 +233,7 @@ def surroundings_of(picture: Picture, points: Points) -> Looks:
         inside = ((at >= 0) & (at <= last)).all(1)
         x, y = (at - [left, top]).astype(np.float32).T
         levels = cv2.remap(smooth, x[None], y[None], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
-        looks.append(np.where(inside, levels, np.nan).astype(np.float32))
+        looks.append(np.where(inside, levels, np.nan).reshape(len(PLACES), -1).astype(np.float32))
     return np.array(looks)
 
 
@@ -288,7 +312,8 @@ def survey(info: VideoInfo, *, one_eye: bool, advance: Callable[[int], None] | N
         _require_agreement(info, [of_face[n] for n in labels])
     unseen = frozenset(seen.keys() - labels.keys())
     around = {n: look for n in labels if (look := of_face[n].surroundings) is not None}
-    covers = covered_frames(info.path, {n: of_face[n].spreads for n in labels}, FEWEST, around)
+    wide = {n: opening_shares(points) for n, points in labels.items()}
+    covers = covered_frames(info.path, {n: of_face[n].spreads for n in labels}, FEWEST, around, wide)
     open_to_view = {n: points for n, points in labels.items() if n not in covers}
     return Survey(open_to_view, len(seen), several, further, unseen, covers)
 

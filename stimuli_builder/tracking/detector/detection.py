@@ -33,7 +33,7 @@ class Detection:
     mirror_shares : tuple of float
         Of each eye of a face, mean distance of its points as read in the picture from those of its mirror
         image, as part of the eye's width; infinite where the mirror image does not show the face.
-    surroundings : float32 array (eyes, cells) or None
+    surroundings : float32 array (eyes, places, cells) or None
         What lies around each eye, see `survey.surroundings_of`; None where nobody looked.
     """
 

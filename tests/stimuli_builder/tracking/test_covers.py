@@ -189,12 +189,30 @@ def test_surroundings_are_the_same_wherever_the_head_is_and_whatever_the_lids_do
     assert first.shape[0] == 2
     for other in (drawn_face(8, 1.2, away=(9, -5)), drawn_face(lids=0.02), drawn_face(-5, 0.9, lids=0.02)):
         for one, two in zip(surroundings_of(*other), first, strict=True):
-            assert likenesses(one, two[None])[0] > 0.95
+            assert likenesses(one[0], two[:1])[0] > 0.95
     picture, points = drawn_face()
     cv2.ellipse(picture, (140, 150), (60, 40), 20, 0, 360, (160, 150, 140), -1)
     covers = surroundings_of(picture, points)
-    assert likenesses(covers[0], first[:1])[0] < 0.5
-    assert likenesses(covers[1], first[1:])[0] > 0.95
+    assert max(likenesses(one, first[0, :1])[0] for one in covers[0]) < 0.5
+    assert likenesses(covers[1, 0], first[1, :1])[0] > 0.95
+
+
+def test_surroundings_of_lids_read_low_and_wide_are_found_where_they_lie():
+    """So the detector reads eyes that shut."""
+    (picture, points), (closed, _) = drawn_face(), drawn_face(lids=0.02)
+    for row in (116, 126, 170, 178):
+        picture[row : row + 2] //= 2
+        closed[row : row + 2] //= 2
+    usual, eyes = surroundings_of(picture, points), points.reshape(2, 9, 2)
+    low = (eyes - eyes.mean(1, keepdims=True)) * 1.09 + eyes.mean(1, keepdims=True) + [0, 4]
+    seen = surroundings_of(closed, low.reshape(18, 2))
+    for places, first in zip(seen, usual, strict=True):
+        own, *others = (likenesses(one, first[:1])[0] for one in places)
+        assert own < 0.85
+        assert max(others) > 0.9
+    spreads = looks(0.025, [], count=20) | {n: [0.07, 0.07] for n in range(20, 26)}
+    around = dict.fromkeys(range(20), usual) | dict.fromkeys(range(20, 26), seen)
+    assert covered_frames(VIDEO, spreads, 6, around) == {}
 
 
 def test_surroundings_beyond_the_picture_are_not_compared():
@@ -203,17 +221,17 @@ def test_surroundings_beyond_the_picture_are_not_compared():
     assert np.isfinite(whole).all()
     assert np.isnan(cut[0]).any()
     assert np.isfinite(cut[1]).all()
-    assert likenesses(cut[0], whole[:1])[0] > 0.99
-    barely = surroundings_of(picture[120:180, 110:165], points - [110, 120])
-    assert likenesses(barely[0], whole[:1])[0] == 0
+    assert likenesses(cut[0, 0], whole[0, :1])[0] > 0.99
+    barely = surroundings_of(picture[128:172, 116:160], points - [116, 128])
+    assert max(likenesses(one, whole[0, :1])[0] for one in barely[0]) == 0
 
 
 def surroundings(count=40, eyes=2, others=(), seed=3):
     """Of looks that all show the same eyes, but for those of `others`, which show something else."""
     rng = np.random.default_rng(seed)
-    usual, strange = rng.normal(size=(2, eyes, 200))
+    usual, strange = rng.normal(size=(2, eyes, 1, 200))
     return {
-        n: ((strange if n in others else usual) + 0.3 * rng.normal(size=(eyes, 200))).astype(np.float32)
+        n: ((strange if n in others else usual) + 0.3 * rng.normal(size=(eyes, 1, 200))).astype(np.float32)
         for n in range(count)
     }
 
@@ -237,6 +255,17 @@ def test_a_small_thing_over_one_eye_is_a_cover_in_the_usual_surroundings_too():
     """Eyes shut and look aside together: where the other one is as ever, this one is not shut."""
     seen = {n: [0.025, 0.025] for n in range(40)} | {n: [0.075, 0.026] for n in range(10, 25)}
     assert set(covered_frames(VIDEO, seen, 6, surroundings())) == set(range(10, 25))
+
+
+def test_an_eye_shuts_with_its_fellow_however_steadily_that_one_is_read():
+    seen = {n: [0.025, 0.04] for n in range(40)} | {n: [0.075, 0.045] for n in range(10, 25)}
+    wide = {n: np.array([0.3, 0.3]) for n in range(40)} | {n: np.array([0.1, 0.1]) for n in range(10, 25)}
+    usual, strange = surroundings(), surroundings(others=range(10, 25))
+    assert set(covered_frames(VIDEO, seen, 6, usual)) == set(range(10, 25))
+    assert covered_frames(VIDEO, seen, 6, usual, wide) == {}
+    assert set(covered_frames(VIDEO, seen, 6, strange, wide)) == set(range(10, 25))
+    open_fellow = wide | {n: np.array([0.1, 0.3]) for n in range(10, 25)}
+    assert set(covered_frames(VIDEO, seen, 6, usual, open_fellow)) == set(range(10, 25))
 
 
 def test_one_steady_look_at_a_cover_makes_no_cover_familiar():
