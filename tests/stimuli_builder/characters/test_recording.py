@@ -14,6 +14,7 @@ from stimuli_builder.characters.recording_bake import RecordingBake, RecordingOr
 from stimuli_builder.characters.recording_levels import lid_travel, near_both_sides
 from stimuli_builder.cli import main
 from stimuli_builder.clips.build import Machines, build
+from stimuli_builder.clips.characters import find_character
 from stimuli_builder.clips.design_clips import Options
 from stimuli_builder.clips.verify import verify
 from stimuli_builder.tracking.cli_track import TrackJob, run_track
@@ -80,14 +81,17 @@ def test_the_tracker_confirms_every_opening(made: Made) -> None:
 
 
 def test_openings_without_labels_are_those_of_the_lids(tmp_path: Path) -> None:
-    recording = Recording(face="alder-face@2", width_px=480, fps=120, seconds=0.7, onsets=(0.1,))
+    recording = Recording(face="alder-face@3", width_px=480, fps=120, seconds=0.7, onsets=(0.1,))
     recording.write(tmp_path)
     baked = bake_recording(RecordingOrder(tmp_path / "person.mp4", tmp_path / "made"))
     recorded = [k for k, level in enumerate(baked.levels) if level.first == level.second]
     off = baked.measured.closures[recorded] - recording.closure[baked.frames.numbers]
+    opening_mm = find_character(recording.face).geometry.opening_mm
     # The detector's lids were up to 1.8 mm off here.
-    assert np.abs(off).max() * 10.07 <= 0.3
-    assert baked.opening_mm == pytest.approx(10.07, abs=0.3)
+    assert np.abs(off).max() * opening_mm <= 0.3
+    # These lids slide 0.4 to 0.6 mm over one another once they have met, which counts as opening. The command
+    # states 0.7 mm.
+    assert baked.opening_mm == pytest.approx(opening_mm, abs=0.7)
     assert "without labels" in (tmp_path / "made" / "report.html").read_text(encoding="utf-8")
 
 

@@ -35,6 +35,8 @@ OPENING_MM = {
     "alder@9": 9.21,
     "birch@7": 9.35,
     "hazel@5": 10.91,
+    "cedar-face@2": 9.85,
+    "alder-face@2": 10.07,
     "alder-face": 10.07,
     "birch": 9.66,
     "birch@3": 9.66,
