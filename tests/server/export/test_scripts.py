@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from experiments.declaration.experiment import Experiment
@@ -51,6 +52,36 @@ def test_the_python_script_gives_our_own_f(answers: Path) -> None:
     line = next(line for line in said.splitlines() if line.startswith("0  lower_lid"))
     found = float(line.split()[4])
     assert found == pytest.approx(own_f(answers), abs=5e-4)
+
+
+@pytest.fixture(scope="module")
+def two_series(answers: Path) -> Path:
+    """The answers, and those of other people to an earlier version on another scale."""
+    newest = pd.read_csv(answers, dtype=str, keep_default_na=False)
+    older = newest.assign(response=[str(1 + row % 5) for row in range(len(newest))])
+    older = older.assign(data_series="1", participant="old" + older["participant"], run="old" + older["run"])
+    file = answers.with_name("two-series.csv")
+    pd.concat([older, newest.assign(data_series="2")]).to_csv(file, index=False)
+    return file
+
+
+def test_the_python_script_takes_the_newest_data_series(answers: Path, two_series: Path) -> None:
+    said = []
+    for file in (answers, two_series):
+        target = file.with_suffix(".py")
+        target.write_text(script(EXP3, "py", file.name), encoding="utf-8")
+        said.append(run([sys.executable, "-W", "ignore", str(target)]))
+    assert said[0] == said[1]
+
+
+def test_the_r_script_takes_the_newest_data_series(answers: Path, two_series: Path) -> None:
+    needed("afex", "emmeans", "lme4")
+    said = []
+    for file in (answers, two_series):
+        target = file.with_suffix(".R")
+        target.write_text(script(EXP3, "R", file.name), encoding="utf-8")
+        said.append(run(["Rscript", str(target)]))
+    assert f_of_r(said[0]) == f_of_r(said[1])
 
 
 @pytest.fixture(scope="module")
