@@ -21,7 +21,7 @@ Bounds = tuple[float, float] | None
 Side = Literal["two-sided", "greater", "less"]
 EXACT_MAX = 50
 """Without ties the exact distribution is used below this many participants, as in R."""
-DIGITS = 11
+DIGITS = 13
 """Significant digits that decide whether values or differences are tied."""
 
 

@@ -235,7 +235,8 @@ def rate_doubts(eyes: Sequence[EyeBlinks]) -> list[str]:
 def speed_doubt(eyes: Sequence[EyeBlinks]) -> list[str]:
     """A line about peak speeds where frames are few; empty without blinks."""
     fps = eyes[0].series.fps
-    if fps >= TELLING_FPS or not any(eye.blinks for eye in eyes):
+    # 59.94 counts as 60.
+    if round(fps) >= TELLING_FPS or not any(eye.blinks for eye in eyes):
         return []
     return [
         f"at {fps:.4g} frames per second peak closing velocities are too low (by 11 to 37% at 30, 16 to 47% "

@@ -191,16 +191,17 @@ def are_uneven(table: pd.DataFrame) -> bool:
 
 def _out_of_order(times: Array, step: int, table: pd.DataFrame, path: Path) -> str:
     """What is wrong with the first step that does not go forward, and what to do."""
-    before, after = times[step], times[step + 1]
+    # Microseconds suffice, also in seconds since 1970, which a short form would show as one number.
+    before, after = times[step : step + 2].round(6).tolist()
     name, line = _name(table), line_of(path, step + 1)
     if not np.isfinite([before, after]).all():
         missing = line if np.isfinite(before) else line_of(path, step)
         return f"{path.name}: line {missing} has no {name}; add the time, or remove the row"
-    does = "repeats the time of the row before" if after == before else "goes back in time"
+    does = "repeats the time of the row before" if times[step] == times[step + 1] else "goes back in time"
     return (
-        f"{path.name}: {name} must increase from row to row, but line {line} {does} ({before:g}, then "
-        f"{after:g} s). Remove repeated rows, or sort the rows; measure recordings with different clocks "
-        "one by one"
+        f"{path.name}: {name} must increase from row to row, but line {line} {does} "
+        f"({before:.16g}, then {after:.16g} s). Remove repeated rows, or sort the rows; measure recordings "
+        "with different clocks one by one"
     )
 
 
@@ -208,7 +209,7 @@ def _measured_fps(table: pd.DataFrame, path: Path, *, uneven: bool) -> float:
     times = pd.to_numeric(table["time_s"], errors="coerce").to_numpy(dtype=np.float64)
     steps = np.diff(times)
     if steps.size == 0:
-        raise InputError(f"{path.name} has {len(times)} frame, which is too short")
+        raise InputError(f"{path.name} has {counted(len(times), 'frame')}; expected two or more")
     # NaN compares as false, so that a missing time is found, too.
     if (wrong := ~(steps > 0)).any():
         raise InputError(_out_of_order(times, int(np.argmax(wrong)), table, path))

@@ -123,6 +123,13 @@ def test_shifted_means_and_means_against_a_value_are_tied_in_spite_of_rounding()
         rank_against(None, ["all"], [np.array([0.1 + 0.2, 0.3])], 0.3)
 
 
+def test_values_far_from_zero_are_not_tied() -> None:
+    """Such as moments in milliseconds since 1970."""
+    sums = np.array(SUMS, dtype=float)
+    far, near = (rank_within("face", ["a", "b", "c"], sums + origin) for origin in (1.76e12, 0.0))
+    assert [pair.p_value for pair in far.pairs] == [pair.p_value for pair in near.pairs]
+
+
 def test_an_interval_without_width_is_explained() -> None:
     ordered = np.array([[1.0, 2.0, 3.0]] * 6) + np.arange(6)[:, None] * 10
     agreed = rank_within("face", ["a", "b", "c"], ordered)
