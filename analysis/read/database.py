@@ -119,15 +119,15 @@ class AnswersQuery:
 def stored_definition(url: str, study: str, series: int | None, version: int | None) -> str | None:
     """The TOML text of a study in this database: the newest version of the only, or the given, data series.
 
-    None if there is no such database or study, or these tables may not be read.
+    None if there is no such database file or study, or these tables may not be read.
 
     Raises
     ------
     InputError
-        A URL that cannot be used, a series or version that the study does not have, or several data series
-        and none given: their definitions differ.
+        A URL that cannot be used, a database without connection, a series or version that the study does not
+        have, or several data series and none given: their definitions differ.
     """
-    _describe(url)
+    name = _describe(url)
     engine = create_engine(with_driver(url))
     file = engine.url.database if engine.url.get_backend_name() == "sqlite" else None
     if file and not Path(file).is_file():
@@ -137,7 +137,14 @@ def stored_definition(url: str, study: str, series: int | None, version: int | N
         "JOIN studies s ON s.id = v.study_id WHERE s.name = :study ORDER BY v.number"
     )
     try:
-        with engine.connect() as connection:
+        connection = engine.connect()
+    except DBAPIError as error:
+        raise InputError(
+            f"'{study}' is not a shipped experiment, and studies cannot be looked up: cannot read {name}: "
+            f"{_first_line(error)}"
+        ) from error
+    try:
+        with connection:
             rows = [tuple(row) for row in connection.execute(query, {"study": study})]
     except DBAPIError:
         return None
@@ -154,7 +161,8 @@ def stored_definition(url: str, study: str, series: int | None, version: int | N
         )
     fits = [row for row in rows if version in (None, row[0]) and series in (None, row[1])]
     if not fits:
-        of = f"version {version}" if version is not None else f"data series {series}"
+        asked = {"version": version, "data series": series}
+        of = " in ".join(f"{what} {number}" for what, number in asked.items() if number is not None)
         raise InputError(
             f"study '{study}' has no {of}; it has {counted(len(rows), 'version')} in {len(every)} data series"
         )

@@ -130,6 +130,14 @@ def test_a_study_in_the_database_is_analysed_by_its_name(tmp_path, monkeypatch) 
     with pytest.raises(InputError, match=r"has 2 data series.*choose one with --series 1 or --series 2"):
         call_raising("run", "motion")
     assert call("run", "motion", "--no-report", "--series", "1").exit_code == 0
+    with pytest.raises(InputError, match=r"has no version 1 in data series 2; it has 2 versions"):
+        call_raising("run", "motion", "--version", "1", "--series", "2")
+
+
+def test_a_database_without_connection_is_named_for_a_study_too() -> None:
+    words = r"'motion' is not a shipped experiment, and studies .* cannot read database lab on 127\.0\.0\.1"
+    with pytest.raises(InputError, match=words):
+        call_raising("run", "motion", "--database", "postgresql://me@127.0.0.1:1/lab")
 
 
 def call_raising(*arguments: str) -> None:
