@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.text import Text
 from sqlalchemy.exc import SQLAlchemyError
 
-from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.files import check_targets, whole_file, whole_text
 from server.accounts.audit import record
@@ -25,9 +24,10 @@ from server.exports.psych_ds import LANGUAGES, script
 from server.exports.repository import runs_by_origin
 from server.exports.schemas import ExportOrigin, Extract
 from server.exports.seals import page, seal_of, seal_plan
+from server.models import StudyVersion
 from server.results import methods as methods_service
-from server.studies.lookup import find_study
-from server.studies.series import definition_of_series
+from server.studies.lookup import definition_of, find_study
+from server.studies.series import definition_of_series, version_of_series
 
 # `server export`: take the data of a study out, in the same forms as the dashboard's data page.
 
@@ -130,7 +130,7 @@ def export(
                 out_file, spreadsheet_pieces(FORMATS[form](session, known, extract), form, bom, guard)
             )
             if form == "csv" and scripts and str(out_file) != "-":
-                beside = _write_scripts(out_file, definition_of_series(session, known, extract.series))
+                beside = _write_scripts(out_file, version_of_series(session, known, extract.series))
         except (ValueError, SQLAlchemyError) as error:
             raise InputError(
                 f"the export failed ({str(error).splitlines()[0]}) and was discarded; run: server doctor"
@@ -151,11 +151,12 @@ def export(
         typer.echo(f"no data of origin {origin} to export; there are runs: {named} (--origin)", err=True)
 
 
-def _write_scripts(out_file: Path, experiment: Experiment) -> str:
+def _write_scripts(out_file: Path, version: StudyVersion) -> str:
     """Write the scripts next to the CSV; return their names in words."""
     targets = {language: out_file.with_suffix(f".{language}") for language in LANGUAGES}
     for language, target in targets.items():
-        _write(target, [encode_text(script(experiment, language, out_file.name))])
+        text = script(definition_of(version), language, out_file.name, series=version.series)
+        _write(target, [encode_text(text)])
     return " or ".join(target.name for target in targets.values())
 
 

@@ -48,7 +48,7 @@ from server.exports.schemas import (
 from server.exports.seals import page, people_begun, seal_of, seal_plan
 from server.models import Right
 from server.participation.identity_keys import UnreadableError
-from server.studies.lookup import active_definition, find_study
+from server.studies.lookup import active_version, definition_of, find_study
 from server.studies.series import definition_of_series
 
 # Downloads of a study's data, of one origin unless all are asked for; streamed in constant memory.
@@ -183,7 +183,7 @@ def download_wide(asked: AskedAsCsv) -> StreamingResponse:
 
 @router.get("/runs.csv", response_class=StreamingResponse)
 def download_runs(asked: AskedAsCsv) -> StreamingResponse:
-    """One row per visit, a column a question of the forms."""
+    """One row per visit, one column per form question."""
     return asked.stream("runs", CSV_TYPE, "runs.csv")
 
 
@@ -193,11 +193,8 @@ def download_script(
 ) -> Response:
     """A script that analyses the long CSV, saved next to it under its own name: for R, or for Python."""
     with database.read() as session:
-        text = script(
-            active_definition(session, find_study(session, study, identity, "view")),
-            language,
-            f"{study}-ratings.csv",
-        )
+        version = active_version(session, find_study(session, study, identity, "view"))
+        text = script(definition_of(version), language, f"{study}-ratings.csv", series=version.series)
     headers = {"content-disposition": f'attachment; filename="{study}.{language}"'}
     return Response(encode_text(text), media_type="text/plain; charset=utf-8", headers=headers)
 

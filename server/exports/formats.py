@@ -114,7 +114,7 @@ def ratings_csv(session: Session, study: Study, extract: Extract) -> Iterator[by
 
 
 def runs_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
-    """One row per visit, a column a question of the forms."""
+    """One row per visit, one column per form question."""
     yield from csv_pieces(runs_table(session, study, extract).with_header())
 
 

@@ -30,7 +30,7 @@ from server.exports.tables import (
 )
 from server.models import Study
 from server.studies.lookup import all_definitions, definition_of
-from server.studies.series import definition_of_series, version_of_series
+from server.studies.series import version_of_series
 from table_files.formulas import guarded_csv
 
 # A table without anything that may identify a person, for datasets that are shared.
@@ -85,7 +85,11 @@ APPLIED = (ExcludeIncomplete, DropFailedPlays, DropSlowTrials)
 
 
 def script(
-    experiment: Experiment, language: ScriptLanguage, data: str, names: Mapping[str, str] | None = None
+    experiment: Experiment,
+    language: ScriptLanguage,
+    data: str,
+    names: Mapping[str, str] | None = None,
+    series: int | None = None,
 ) -> str:
     """The script of an experiment.
 
@@ -95,6 +99,8 @@ def script(
         The CSV it reads by default: a path from the script's own folder.
     names : mapping of str to str, optional
         What factors are called in that CSV, where it is not their own name.
+    series : int, optional
+        Data series that this experiment declares; the newest if the CSV has no rows of it.
     """
     column = dict(names or {})
     factors: list[dict[str, Any]] = [
@@ -121,6 +127,7 @@ def script(
             f"add the runs that `analysis run` reports to this script"
         ),
         "view": KINDS[experiment.trial.kind].view.name,
+        "series": series,
     }
     templates = [f"{values['view']}.{language}.j2", f"answers.{language}.j2"]
     return _environment().select_template(templates).render(values)
@@ -180,10 +187,8 @@ def dataset(session: Session, study: Study, made: str, extract: Extract) -> Iter
 
 def dataset_folder(session: Session, study: Study, made: str, extract: Extract) -> Folder:
     """`dataset_description.json`, README, CHANGES, `data/`, codebook, definition and scripts."""
-    definition, definitions = (
-        definition_of_series(session, study, extract.series),
-        all_definitions(session, study),
-    )
+    version = version_of_series(session, study, extract.series)
+    definition, definitions = definition_of(version), all_definitions(session, study)
     factors = {factor.name for one in definitions for factor in one.factors}
     renamed = {name: beside_runs(name) for name in sorted(factors) if beside_runs(name) != name}
     first = first_start(session, study, extract)
@@ -198,7 +203,7 @@ def dataset_folder(session: Session, study: Study, made: str, extract: Extract) 
     texts = _texts(session, study, made, extract, tables)
     for language in LANGUAGES:
         texts[f"analysis/analysis.{language}"] = script(
-            definition, language, f"../{paths[tables[0].name]}", renamed
+            definition, language, f"../{paths[tables[0].name]}", renamed, version.series
         )
     members = (
         *((path, [encode_text(text)]) for path, text in texts.items()),

@@ -522,7 +522,7 @@ def answers_table(session: Session, study: Study, extract: Extract) -> ExportTab
 
 
 def runs_table(session: Session, study: Study, extract: Extract) -> ExportTable:
-    """One row per visit, a column a question of the forms."""
+    """One row per visit, one column per form question."""
     forms, number = form_columns(all_definitions(session, study)), run_count(session, study, extract)
     rows = check_whole(run_rows(session, study, extract, forms), number)
     return ExportTable("runs", run_columns(forms, extract.old_order), rows, number)

@@ -74,6 +74,22 @@ def test_the_python_script_takes_the_newest_data_series(answers: Path, two_serie
     assert said[0] == said[1]
 
 
+@pytest.mark.parametrize(("series", "kept"), [(1, "1"), (2, "2"), (3, "2"), (None, "2")])
+def test_the_python_script_takes_the_data_series_of_its_declaration(
+    two_series: Path, tmp_path: Path, series: int | None, kept: str
+) -> None:
+    """A version that measures as an earlier one goes on with its series, which then is not the newest."""
+    rows = pd.read_csv(two_series, dtype=str, keep_default_na=False)
+    alone = rows[rows["data_series"] == kept].drop(columns="data_series")
+    alone.to_csv(tmp_path / "alone.csv", index=False)
+    said = []
+    for file in (two_series, tmp_path / "alone.csv"):
+        target = tmp_path / "script.py"
+        target.write_text(script(EXP3, "py", file.name, series=series), encoding="utf-8")
+        said.append(run([sys.executable, "-W", "ignore", str(target), str(file)]))
+    assert said[0] == said[1]
+
+
 def test_the_r_script_takes_the_newest_data_series(answers: Path, two_series: Path) -> None:
     needed("afex", "emmeans", "lme4")
     said = []
