@@ -385,7 +385,9 @@ def _own_study(order: NewStudy, folder: Path) -> tuple[str, Experiment, Manifest
         raise Invalid("Enter a title and a question for the study, or a definition.")
     text = order.toml
     if text is None and order.own_clips is not None:
-        text = own_clips.definition_text(order.name, placed, order.own_clips)
+        text = own_clips.definition_text(
+            order.name, placed, order.own_clips, own_clips.largest_of(placed, folder)
+        )
     experiment = planned_experiment(text or "")
     return text or "", experiment, own_clips.manifest_of(experiment, placed, folder), folder
 

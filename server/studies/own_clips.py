@@ -8,6 +8,7 @@ from typing import Any
 from experiments import design
 from experiments.declaration.clip_rating import SCALE_NAME
 from experiments.declaration.experiment import Experiment
+from experiments.declaration.tables import Display
 from experiments.errors import InputError
 from experiments.manifest import UPLOADED, Clip, Manifest
 from experiments.own_clips import Placed, check_factorial, levels_of
@@ -143,8 +144,21 @@ class StillPreparing(Conflict, code="still_preparing"):
     """Clips of an upload are still being looked into or converted."""
 
 
-def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
-    """A definition as TOML, to be edited further: one factor a column, random order, the template's trial."""
+def largest_of(placed: Placed, folder: Path) -> tuple[int, int]:
+    """Greatest width and greatest height of an upload's clips, in pixels; 0 of those not looked into yet."""
+    records = [record for name, record in records_of(folder).items() if name in placed]
+    return (
+        max((record.width_px for record in records), default=0),
+        max((record.height_px for record in records), default=0),
+    )
+
+
+def definition_text(name: str, placed: Placed, asked: OwnClips, largest: tuple[int, int] = (0, 0)) -> str:
+    """A definition as TOML, to be edited further: one factor a column, random order, the template's trial.
+
+    Its smallest window holds the largest clip, `largest` pixels wide and high: in a smaller one the clip
+    would be cut off at the sides, though every frame is shown.
+    """
     import tomlkit  # takes a twentieth of the time of a start
 
     check_factorial(placed)
@@ -167,10 +181,19 @@ def definition_text(name: str, placed: Placed, asked: OwnClips) -> str:
     # Practice on most of the clips would show participants the study before it begins.
     document.add("practice", tomlkit.item({"trials": max(1, min(4, len(placed) // 3))}))
     document.add("trial", tomlkit.item(trial_of(asked, factor_levels)))
-    document.add("display", tomlkit.item({"calibrate": "off"}))
+    document.add("display", tomlkit.item({"calibrate": "off"} | _window_for(*largest)))
     document.add("exclusions", tomlkit.item([{"rule": "incomplete"}, {"rule": "failed_plays"}]))
     document.add("texts", tomlkit.item({"en": _texts(asked)}))
     return tomlkit.dumps(document)
+
+
+def _window_for(width: int, height: int) -> dict[str, int]:
+    usual = Display()
+    return {
+        key: px
+        for key, px in (("minimum_width_px", width), ("minimum_height_px", height))
+        if px > getattr(usual, key)
+    }
 
 
 _START = "Press **Space** or **Enter**, or tap, to start"

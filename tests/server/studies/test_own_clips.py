@@ -52,6 +52,20 @@ def test_own_clips_become_a_study_by_a_file_name_pattern(experimenter: Admin) ->
     assert made.json()["summary"]["status"] == "draft"
 
 
+def test_the_smallest_window_holds_the_largest_clip(experimenter: Admin) -> None:
+    films = {"fast_1.mp4": encoded_video(4, 30, 960, 360), "slow_1.mp4": encoded_video(4, 30, 320, 620)}
+    found = upload(experimenter, ("clips.zip", zipped(films))).json()
+    body = {
+        "name": "wide", "upload": found["id"], "levels": {"pattern": "{speed}_{exemplar}.mp4"},
+        "own_clips": {"title": "Wide"},
+    }  # fmt: skip
+    made = experimenter.send("POST", "/studies", body)
+    assert made.status_code == 201, made.text
+    stored = made.json()["toml"]
+    display = parse_experiment(stored, "wide").display
+    assert (display.minimum_width_px, display.minimum_height_px) == (960, 620)
+
+
 def test_clips_are_listed_in_the_declared_order_of_their_levels(experimenter: Admin) -> None:
     names = [f"{speed}_{number}.mp4" for speed in ("fast", "middle", "slow") for number in (2, 1)]
     found = upload(experimenter, ("clips.zip", zipped(video_files(*names)))).json()
