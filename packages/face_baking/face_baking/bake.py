@@ -31,7 +31,7 @@ from face_baking.renderer import Renderer, Setup, Shot, load_light
 from face_baking.scene import FaceScene
 
 # Raise when geometry, textures, materials, lights, lens or a framing change: work of others is not resumed.
-RECIPE = 37
+RECIPE = 38
 NOTICE = "Rendered from ICT-FaceKit geometry, (c) 2020 USC Institute for Creative Technologies, MIT licence"
 
 

@@ -56,8 +56,8 @@ def bake_face(
             min=0,
             max=4096,
             help=(
-                "Cycles samples per pixel where lids and lashes move; the skin around them then keeps the "
-                "still frame's noise [as --samples]."
+                "Cycles samples per pixel where lids and lashes move, twice as many beyond half closure; the "
+                "skin around them then keeps the still frame's noise [as --samples]."
             ),
         ),
     ] = 0,

@@ -134,7 +134,10 @@ def corner_floor(
         shade = shade * (1 + meets * (_evened(path, side, vertices) - 1))
         dark, light = CARUNCLE_LIGHT
         lightness = dark + (light - dark) * float(smooth(0.9, 0.3, np.asarray(melanin)))
-        share = (smooth(_PLICA_CM + 0.16, _PLICA_CM - 0.14, way) * np.ones_like(height)).ravel()
+        # The flesh ends in an arc with an uneven edge: a straight one showed as an upright seam.
+        places = np.stack(np.broadcast_arrays(9 * way, 2.1 * across, side), -1).reshape(-1, 3)
+        uneven = 0.05 * value_noise(places, 31 + side, 2).reshape(height.shape)
+        share = smooth(_PLICA_CM + 0.10, _PLICA_CM - 0.24, way - 0.16 * across**2 + uneven).ravel()
         shade = shade + share * (lightness * (0.7 + 0.3 * np.clip(flesh, 0, 1)).ravel() - shade)
     else:
         flush = (0.5 * smooth(0.22, 0.02, way) * np.ones_like(height)).ravel()
@@ -175,7 +178,7 @@ def _flesh_and_plica(way: Array, across: Array, side: int) -> tuple[Array, Array
     where = np.stack(np.broadcast_arrays(13 * way, 1.7 * across, side), -1).reshape(-1, 3)
     grain = value_noise(where, 3 + side, 2).reshape(dome.shape)
     plica = np.exp(-(((way - _PLICA_CM - 0.08 * across**2) / _PLICA_WIDE_CM) ** 2))
-    return dome * (1 + 0.25 * grain), plica
+    return dome * (1 + 0.40 * grain), plica
 
 
 def wet_film(path: BlinkPath, side: int, stroke: float) -> Mesh:

@@ -21,6 +21,11 @@ CORNER_SHIFT = (
 """Way from the corner's old tip toward the temple, and the way of what lies there toward the nose, cm."""
 CORNER_NARROWED = ((-1.9, -0.6, -0.2, 0.1, 0.5, 0.9, 1.2), (0.0, 0.0, -0.05, 0.20, 0.15, 0.0, 0.0))
 """Share of its height that the wedge loses, at the same places."""
+CORNER_TAPERED = (
+    (-1.2, -0.4, -0.1, 0.05, 0.15, 0.3, 0.5, 0.7, 0.9),
+    (0.0, 0.0, 0.35, 0.62, 0.56, 0.36, 0.14, 0.0, 0.0),
+)
+"""Way from the new tip toward the temple, cm, and the share of their height that both lids lose there."""
 CORNER_FADES_CM = (0.25, 1.1)
 """Heights from the corner up to which the shift is whole, and from which there is none."""
 CORNER_BACK = 0.18
@@ -78,7 +83,13 @@ def with_longer_corner(kit: FaceKit, rest: Array, loops: list[Index], globe: Glo
     away = rest - globe.centre
     back = np.clip(away[:, 0] * side / np.maximum(away[:, 2], 0.3), -0.9, 0) * CORNER_BACK
     move = np.stack([-shift * side, -narrow * height, back * shift], -1)
-    return np.asarray(rest + move)
+    moved = rest + move
+    # The new tip is where the old one went; lids run to a point there.
+    way = (moved[:, 0] - moved[upper[0], 0]) * side
+    high = moved[:, 1] - moved[upper[0], 1]
+    taper = np.where(near, PchipInterpolator(*CORNER_TAPERED)(np.clip(way, -1.2, 0.9)), 0.0)
+    moved[:, 1] -= taper * smooth(0.9, 0.25, np.abs(high)) * high
+    return np.asarray(moved)
 
 
 def globe_of(kit: FaceKit, vertices: Array, side: int) -> Globe:

@@ -14,6 +14,10 @@ LOWER_LID_AFTER = 10
 """Shots before the lower lid's: the still frame and nine levels."""
 
 
+LASHES_HANG = 0.5
+"""From here on lashes lie before the lid, where few samples break them into dots: it gets twice as many."""
+
+
 @dataclass(frozen=True)
 class Samples:
     """Cycles samples per pixel of the moving boxes, of the still frame, and of where lids and lashes pass.
@@ -70,7 +74,7 @@ def level_shots(
 def _level_shot(
     work: Path, closure: float, boxes: dict[str, Box], lids: dict[str, Box], samples: Samples
 ) -> Shot:
-    finer = dict.fromkeys(lids, samples.lids)
+    finer = dict.fromkeys(lids, samples.lids * (2 if closure > LASHES_HANG else 1))
     return Shot(work / f"level_{closure:.6f}.npz", LidPose(closure), boxes | lids, samples.boxes, finer)
 
 

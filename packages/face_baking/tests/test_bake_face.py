@@ -24,7 +24,7 @@ from face_baking.identity import (
 )
 from face_baking.kit import FaceKit
 from face_baking.lid_pose import LidPose
-from face_baking.plan import Samples, closures_of
+from face_baking.plan import LASHES_HANG, Samples, closures_of
 from face_baking.renderer import Renderer, Setup, Shot, load_light
 from face_baking.scene import MOVING, FaceScene
 from face_baking.sphere import IRIS_CM
@@ -130,7 +130,8 @@ def test_lids_have_boxes_and_samples_of_their_own(kit: FaceKit, scene: FaceScene
     bake = bake_of(kit, scene, replace(order(tmp_path), samples=Samples(1, 2, 4)))
     for shot in bake.levels:
         assert list(shot.boxes) == ["left", "right", "left_lids", "right_lids"]
-        assert shot.finer == {"left_lids": 4, "right_lids": 4}
+        number = 8 if shot.pose.closure > LASHES_HANG else 4
+        assert shot.finer == {"left_lids": number, "right_lids": number}
         assert shot.samples == 1
     for name, (x, y, width, height) in scene.boxes.items():
         lids = scene.lid_boxes[name]
