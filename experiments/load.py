@@ -170,7 +170,19 @@ class DefinitionError(InputError):
 
 
 class UnknownExperimentError(InputError):
-    """A name that is neither a shipped experiment nor the path of a file."""
+    """A name that is neither a shipped experiment nor the path of a file.
+
+    Parameters
+    ----------
+    said : str
+        What is wrong, and what is expected.
+    elsewhere : str
+        Where a study made in the browser is found; empty for what cannot be one.
+    """
+
+    def __init__(self, said: str, elsewhere: str = "") -> None:
+        self.said, self.elsewhere = said, elsewhere
+        super().__init__(f"{said}. {elsewhere}" if elsewhere else said)
 
 
 def load_experiment(name_or_path: str, *, has_data: bool = False) -> Experiment:
@@ -195,23 +207,27 @@ def locate(name_or_path: str) -> Path:
         raise InputError(
             f"there is no file {name_or_path}; expected a TOML file or one of {', '.join((*SHIPPED, *DEMOS))}"
         )
-    raise UnknownExperimentError(_unknown_name(name_or_path, stem))
+    raise _unknown_name(name_or_path, stem)
 
 
-def _unknown_name(name: str, stem: str) -> str:
+def _unknown_name(name: str, stem: str) -> UnknownExperimentError:
     """What to do about a name that is not shipped: one like it, a file without its ending, or a study."""
     names = (*SHIPPED, *DEMOS)
     expected = f"expected one of: {', '.join(names)}, or the path of a TOML file"
     if Path(f"{name}.toml").is_file():
-        return f"no experiment '{name}'; for the file of this name, write {name}.toml"
+        return UnknownExperimentError(
+            f"no experiment '{name}'; there is a file {name}.toml here; to use it, give its whole name: "
+            f"{name}.toml"
+        )
     begins = (shipped for shipped in names if len(stem) > 3 and shipped.startswith(stem))
     near = next(begins, None) or nearest(stem, names, cutoff=0.7)
     said = f"no experiment '{name}'; " + (f"did you mean '{near}'? E{expected[1:]}" if near else expected)
     if "/" in name:
-        return said
-    return (
-        f"{said}. For a study made in the browser, open its Design tab, download the definition and write "
-        f"{name}.toml"
+        return UnknownExperimentError(said)
+    return UnknownExperimentError(
+        said,
+        "For a study made in the browser, press the button on its Design tab that downloads the definition "
+        f"({name}.toml), and give the path of the downloaded file",
     )
 
 

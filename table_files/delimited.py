@@ -22,6 +22,9 @@ _MARKS = (
     (codecs.BOM_UTF16_BE, "UTF-16"),
 )
 """Byte order marks of encodings that spreadsheets write besides UTF-8, the longer first."""
+TABLE_ENDINGS = (".csv", ".tsv", ".txt", ".xlsx", ".sav", ".json")
+"""How the names of tables end, as messages list them."""
+_TEXT_ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".tab", ".json", ".jsonl")
 _HEAD_BYTES = 1 << 12
 _BLOCK_BYTES = 1 << 20
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
@@ -47,13 +50,22 @@ def encoding_of(path: Path) -> str:
         start = file.read(_HEAD_BYTES)
     encoding = next((name for mark, name in _MARKS if start.startswith(mark)), None) or _without_mark(start)
     if encoding is None and b"\0" in start:
-        raise InputError(f"{path.name} is not UTF-8 text (it holds null bytes); save it as CSV UTF-8")
+        raise _not_text(path, "UTF-8", "it holds null bytes")
     reason = _undecodable(path, encoding or "utf-8")
     if not reason:
         return encoding or "utf-8-sig"
     if encoding is None and _is_windows_text(path.read_bytes()):
         return WINDOWS
-    raise InputError(f"{path.name} is not {encoding or 'UTF-8'} text ({reason}); save it as CSV UTF-8")
+    raise _not_text(path, encoding or "UTF-8", reason)
+
+
+def _not_text(path: Path, encoding: str, reason: str) -> InputError:
+    """A table with a damaged encoding, or a file of another kind, such as a video."""
+    if path.suffix.lower() not in _TEXT_ENDINGS:
+        return InputError(
+            f"'{path.name}' is not a table; expected a file ending in {', '.join(TABLE_ENDINGS)}"
+        )
+    return InputError(f"{path.name} is not {encoding} text ({reason}); save it as CSV UTF-8")
 
 
 def text_of(path: Path) -> str:

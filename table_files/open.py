@@ -97,6 +97,8 @@ def refuse_unread(path: Path) -> None:
     suffix = path.suffix.lower()
     if suffix in _SAVE_AS:
         raise InputError(f"{path.name}: files of {suffix} are not read; save it as {_SAVE_AS[suffix]}")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path.name} is empty; expected a table with a header line")
 
 
 def delimited_cells(path: Path, names: list[str]) -> Cells:

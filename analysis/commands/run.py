@@ -20,6 +20,7 @@ from experiments.files import check_folder
 if TYPE_CHECKING:
     from analysis.read.pool import Pool
     from experiments.declaration.experiment import Experiment
+    from experiments.load import UnknownExperimentError
 
 
 class Origin(StrEnum):
@@ -172,7 +173,7 @@ def _declared_experiment(
     try:
         return load_experiment(name_or_path, has_data=True), study
     except UnknownExperimentError as error:
-        if "/" in name_or_path or Path(f"{name_or_path}.toml").is_file():
+        if "/" in name_or_path:
             raise
         if database is not None and study in (None, name_or_path):
             from analysis.read.database import stored_definition
@@ -180,7 +181,23 @@ def _declared_experiment(
             toml = stored_definition(database, name_or_path, pool.series, pool.version)
             if toml is not None:
                 return parse_experiment(toml, name_or_path, has_data=True), name_or_path
-        # Its Design tab has the definition, and its Data tab the answers.
-        raise InputError(
-            f"{error}. With the CSV from its Data tab: analysis run {name_or_path}.toml --csv FILE"
-        ) from error
+        raise _no_such_study(name_or_path, database, error) from error
+
+
+def _no_such_study(name: str, database: str | None, error: "UnknownExperimentError") -> InputError:
+    """What to do about a name that is neither an experiment nor a study: a file, the database, a download."""
+    if Path(f"{name}.toml").is_file():
+        return InputError(
+            f"no experiment '{name}'; there is a file {name}.toml here; to use it: analysis run {name}.toml"
+        )
+    # Its Design tab has the definition, and its Data tab the answers.
+    elsewhere = f"{error.elsewhere}. With the CSV from its Data tab: analysis run {name}.toml --csv FILE"
+    if database is None:
+        return InputError(f"{error.said}. {elsewhere}")
+    from analysis.read.database import said_of_studies
+    from experiments.load import DEMOS, SHIPPED
+
+    stored, is_all = said_of_studies(database, name, (*SHIPPED, *DEMOS))
+    if is_all:
+        return InputError(f"no experiment or study '{name}'; {stored}")
+    return InputError(f"{error.said}. {stored}. {elsewhere}")

@@ -27,6 +27,9 @@ NO_FACTOR = (
     r"|.*rating.*|.*_id"
 )
 """Columns with few values that separate rows and were not varied."""
+_DATE = r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{2,4}"
+_CLOCK = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?: ?[AaPp][Mm])?(?: ?(?:Z|UTC|[+-]\d{2}:?\d{2}))?"
+_TIME = re.compile(rf"(?:{_DATE})(?:(?:T|,? ){_CLOCK})?|{_CLOCK}")
 
 ROLES = (
     *("participant", "rating", "within", "between", "covariate", "item"),
@@ -222,8 +225,13 @@ def _named_roles(texts: Mapping[str, "pd.Series[str]"], numbers: Mapping[str, bo
         if re.fullmatch("age", name.strip(), re.IGNORECASE) and numbers[name]:
             roles[name] = "covariate"
         # A column whose every value differs names the rows and was not varied.
-        elif 2 <= values.nunique() <= MAX_LEVELS and values.nunique() < len(values):
-            roles[name] = "between" if person and _one_value_each(column, texts[person]) else "within"
+        elif (
+            2 <= values.nunique() <= MAX_LEVELS and values.nunique() < len(values) and not _are_times(values)
+        ):
+            if person is None or not _one_value_each(column, texts[person]):
+                roles[name] = "within"
+            elif _forms_groups(values, texts[person]):
+                roles[name] = "between"
     if (
         person is not None
         and "rating" not in roles.values()
@@ -248,6 +256,15 @@ def _is_whole(role: str, name: str) -> bool:
     # Split at bars outside parentheses only: those inside belong to one word.
     words = "|".join(part for part in re.split(r"\|(?![^(]*\))", NAMES[role]) if ".*" not in part)
     return re.fullmatch(words, name.strip(), re.IGNORECASE) is not None
+
+
+def _are_times(values: "pd.Series[str]") -> bool:
+    return all(_TIME.fullmatch(value.strip()) for value in values.unique())
+
+
+def _forms_groups(values: "pd.Series[str]", people: "pd.Series[str]") -> bool:
+    """Whether people share values; else nearly every value is of one person, as with a time or a comment."""
+    return 3 * values.nunique() <= 2 * people[values.index].nunique()
 
 
 def _one_value_each(column: "pd.Series[str]", people: "pd.Series[str]") -> bool:

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from sqlalchemy import Connection, create_engine, inspect, text
-from sqlalchemy.engine import make_url
+from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
 from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, NoRatingsError, Reading
 from analysis.read.text_table import categorical
 from experiments.errors import InputError
 from experiments.files import with_driver
-from table_files import counted
+from table_files import counted, nearest
 
 PORTION = 20_000
 KINDS = ("main", "attention")
@@ -34,11 +34,10 @@ class AnswersQuery:
         self._connection = self._open()
 
     def _open(self) -> Connection:
-        location = self._engine.url
-        file = location.database if location.get_backend_name() == "sqlite" else None
-        if file and file != ":memory:" and not Path(file).is_file():
+        if file := missing_file(self._engine.url):
             raise NoRatingsError(
-                f"there is no database at {file}; run a study first, or use --database or --csv"
+                f"there is no database at {file}; set PALPEBRA_DATA_FOLDER to the server's data folder, or "
+                "use --database or --csv"
             )
         try:
             connection = self._engine.connect()
@@ -127,29 +126,12 @@ def stored_definition(url: str, study: str, series: int | None, version: int | N
         A URL that cannot be used, a database without connection, a series or version that the study does not
         have, or several data series and none given: their definitions differ.
     """
-    name = _describe(url)
-    engine = create_engine(with_driver(url))
-    file = engine.url.database if engine.url.get_backend_name() == "sqlite" else None
-    if file and not Path(file).is_file():
-        return None
-    query = text(
-        "SELECT v.number, v.series, v.definition_toml FROM study_versions v "
-        "JOIN studies s ON s.id = v.study_id WHERE s.name = :study ORDER BY v.number"
+    rows = _selected(
+        url,
+        "v.number, v.series, v.definition_toml FROM study_versions v "
+        "JOIN studies s ON s.id = v.study_id WHERE s.name = :study ORDER BY v.number",
+        study,
     )
-    try:
-        connection = engine.connect()
-    except DBAPIError as error:
-        raise InputError(
-            f"'{study}' is not a shipped experiment, and studies cannot be looked up: cannot read {name}: "
-            f"{_first_line(error)}"
-        ) from error
-    try:
-        with connection:
-            rows = [tuple(row) for row in connection.execute(query, {"study": study})]
-    except DBAPIError:
-        return None
-    finally:
-        engine.dispose()
     if not rows:
         return None
     every = sorted({row[1] for row in rows})
@@ -167,6 +149,68 @@ def stored_definition(url: str, study: str, series: int | None, version: int | N
             f"study '{study}' has no {of}; it has {counted(len(rows), 'version')} in {len(every)} data series"
         )
     return str(fits[-1][2])
+
+
+MAX_NAMES = 10
+
+
+def said_of_studies(url: str, name: str, others: Sequence[str]) -> tuple[str, bool]:
+    """Why a database has no study of this name, in a sentence, and whether it is all that there is to say.
+
+    Parameters
+    ----------
+    others : sequence of str
+        Names of shipped experiments: one of these may be the nearest.
+    """
+    if file := missing_file(make_url(with_driver(url))):
+        hint = "set PALPEBRA_DATA_FOLDER to the server's data folder, or use --database"
+        return f"There is no database at {file} to look for a study in; {hint}", False
+    names = [str(row[0]) for row in _selected(url, "name FROM studies ORDER BY name", name)]
+    where = _describe(url)
+    if not names:
+        return f"No studies were found in {where}", False
+    near = nearest(name, [*names, *others], cutoff=0.6)
+    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+    listed = f"Studies in {where}: {', '.join(names[:MAX_NAMES])}{more}"
+    if near in names:
+        return f"did you mean '{near}'? {listed}", True
+    return listed, False
+
+
+def missing_file(url: URL) -> str | None:
+    """The SQLite file of a URL if it does not exist."""
+    file = url.database if url.get_backend_name() == "sqlite" else None
+    return file if file and file != ":memory:" and not Path(file).is_file() else None
+
+
+def _selected(url: str, selection: str, study: str) -> list[tuple[Any, ...]]:
+    """Rows of the server's own tables; none where there is no such database, or they may not be read.
+
+    Raises
+    ------
+    InputError
+        A URL that cannot be used, or a database without connection.
+    """
+    name = _describe(url)
+    engine = create_engine(with_driver(url))
+    if missing_file(engine.url):
+        return []
+    query = text(f"SELECT {selection}")
+    try:
+        connection = engine.connect()
+    except DBAPIError as error:
+        raise InputError(
+            f"'{study}' is not a shipped experiment, and studies cannot be looked up: cannot read {name}: "
+            f"{_first_line(error)}"
+        ) from error
+    try:
+        with connection:
+            values = {"study": study} if ":study" in selection else {}
+            return [tuple(row) for row in connection.execute(query, values)]
+    except DBAPIError:
+        return []
+    finally:
+        engine.dispose()
 
 
 class _Codes:

@@ -431,7 +431,7 @@ REASONS = {
     "order": "The clips were not played in their order.",
     "interaction": "Most answers came without a key press or a click.",
     "trusted": "Key presses or clicks were made by a script, or are not known.",
-    "press_ms": "Keys and buttons were held for no time, or it is not known for how long.",
+    "press_ms": "Key presses and clicks had no duration, or their duration is not known.",
     "press_spread": "Every key or button was held for the same time.",
     "rt_median": "Half of the answers came within 0.2 s.",
     "rt_spread": "All answers took nearly the same time.",

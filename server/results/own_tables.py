@@ -22,9 +22,9 @@ from pydantic import Base64Bytes, BaseModel, ConfigDict, Field
 from server.accounts.access import Writer
 from server.core.errors import ERROR_RESPONSES, ApiError, Invalid
 from server.results.jobs import last_line, own_program
+from table_files.delimited import TABLE_ENDINGS
 
 router = APIRouter(prefix="/api/admin/analyses", tags=["analyses"], responses=ERROR_RESPONSES)
-ENDINGS = (".csv", ".tsv", ".txt", ".xlsx", ".sav", ".json")
 LIMIT_S = 60
 WAIT_S = 1.0
 """Longer waits would take the few places that experimenters' requests have."""
@@ -152,8 +152,8 @@ def analyze_table(_: Writer, body: OwnAnalysis) -> OwnResult:
 def _table_folder(body: OwnTable) -> Iterator[tuple[Path, Path]]:
     """A folder with the table, which is removed at the end; one table at a time."""
     ending = PurePosixPath(body.name).suffix.lower()
-    if ending not in ENDINGS:
-        raise Invalid(f"'{body.name}' is not a table; expected a file ending in {', '.join(ENDINGS)}")
+    if ending not in TABLE_ENDINGS:
+        raise Invalid(f"'{body.name}' is not a table; expected a file ending in {', '.join(TABLE_ENDINGS)}")
     if not _one_at_a_time.acquire(timeout=WAIT_S):
         again = {"retry-after": "30"}
         raise AnalysisBusy("Another table is being analyzed. Try again in a minute.", headers=again)

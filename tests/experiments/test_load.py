@@ -74,7 +74,7 @@ def test_an_unknown_experiment_is_refused_with_the_nearest() -> None:
     with pytest.raises(InputError, match=r"no experiment 'pairs'; did you mean 'pairs-demo'\?"):
         load_experiment("pairs")
     with pytest.raises(
-        InputError, match=r"^no experiment 'motion'; expected .* browser, .*write motion.toml$"
+        InputError, match=r"^no experiment 'motion'; expected .* browser, .* downloads .* downloaded file$"
     ):
         load_experiment("motion")
     with pytest.raises(InputError, match=r"^no experiment 'in/motion'; expected .* path of a TOML file$"):
@@ -85,7 +85,7 @@ def test_a_file_given_without_its_ending_is_named(tmp_path, monkeypatch) -> None
     monkeypatch.chdir(tmp_path)
     (tmp_path / "motion.toml").write_text("")
     with pytest.raises(
-        InputError, match=r"^no experiment 'motion'; for the file of this name, write motion.toml$"
+        InputError, match=r"^no experiment 'motion'; there is a file motion.toml here; .*: motion.toml$"
     ):
         load_experiment("motion")
 

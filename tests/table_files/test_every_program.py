@@ -203,3 +203,27 @@ def test_a_separator_within_quotes_does_not_count() -> None:
     assert separator_of('"a;b;c;d",x') == ","
     assert separator_of("a\tb") == "\t"
     assert separator_of("a;b,c;d") == ";"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        (
+            "clip.mp4",
+            b"\x00\x00\x00 ftypisom" * 9,
+            "'clip.mp4' is not a table; expected a file ending in .csv,",
+        ),
+        (
+            "page.pdf",
+            b"%PDF-1.7\n%\xb5\x81\x8d\n",
+            "'page.pdf' is not a table; expected a file ending in .csv,",
+        ),
+        ("book.xlsx", b"", "book.xlsx is empty; expected a table with a header line"),
+        ("data.json", b"", "data.json is empty; expected a table with a header line"),
+    ],
+)
+def test_a_file_that_is_no_table_is_called_so(tmp_path, name, content, said) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(InputError) as refused:
+        named_rows(tmp_path / name)
+    assert str(refused.value).startswith(said)

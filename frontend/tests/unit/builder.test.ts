@@ -449,6 +449,10 @@ describe("what a form begins with", () => {
     const text = withKnown(online, { title: "Smiles & $1", minutes: "7" });
     expect(text).toContain("# Smiles & $1");
     expect(text).toContain("about 7 minutes");
+    for (const template of Object.values(CONSENTS["en"] ?? {}))
+      expect(withKnown(template, { title: "", minutes: "1" })).toContain("It takes about 1 minute.");
+    for (const template of Object.values(CONSENTS["de"] ?? {}))
+      expect(withKnown(template, { title: "", minutes: "1" })).toContain("etwa 1 Minute.");
     expect(unfilledMarks(text)).toEqual(["[topic]", "[name, institution, e-mail]", "[number]"]);
     expect(withKnown("# [Titel], [Minuten]", { title: "", minutes: "" })).toBe("# [Titel], [Minuten]");
     expect(unfilledMarks("See [our page](https://example.org).")).toEqual([]);

@@ -23,7 +23,7 @@ import { sizeRemark } from "../../src/admin/clips/UploadClips";
 import { languageFindings, ranked, summaryOf } from "../../src/admin/studies/Preflight";
 import { matching } from "../../src/admin/studies/StudiesPage";
 import { expectedReturn, isReturn, testAddress } from "../../src/admin/studies/SelfTest";
-import { nextStep } from "../../src/admin/studies/StatusBadge";
+import { nextStep, turnedAwayHere } from "../../src/admin/studies/StatusBadge";
 import {
   declaredPattern,
   factorsOfTable,
@@ -302,7 +302,7 @@ describe("the next step of a study", () => {
 
   it("follows the status afterwards", () => {
     expect(nextStep({ ...study, status: "pilot" }, []).page).toBe("/results");
-    expect(nextStep({ ...study, status: "live", quota: 20 }, []).text).toBe("Watch the participants: 3 of 20 complete.");
+    expect(nextStep({ ...study, status: "live", quota: 20 }, []).text).toBe("Follow the participants on the monitor (3 of 20 complete).");
     expect(nextStep({ ...study, status: "live", paused: true }, []).page).toBe("/settings");
     expect(nextStep({ ...study, status: "closed" }, []).page).toBe("/data");
     expect(nextStep({ ...study, archived_at: "2026-01-01" }, []).page).toBe("/settings");
@@ -484,4 +484,13 @@ it("a refusal is headed by what was refused, a fault by that alone", () => {
   expect(titleOf(new Refused(409, "conflict", "Wait."))).toBe("Not possible at the moment");
   expect(titleOf(new Refused(500, "internal", "A fault."))).toBe("Something went wrong");
   expect(titleOf(new Error("x is undefined"))).toBe("Something went wrong");
+});
+
+describe("the devices that a study turns away", () => {
+  it("does not send somebody to the page that she is on", () => {
+    const said = "Phones cannot be used: a phone has about 390 x 600.";
+    expect(turnedAwayHere(`${said} To change the minimum width and height, see Screen and playback.`)).toBe(said);
+    const touch = "Phones and tablets cannot be used: the study does not allow devices with a touch screen and no mouse.";
+    expect(turnedAwayHere(touch)).toBe(touch);
+  });
 });

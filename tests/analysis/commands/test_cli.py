@@ -54,6 +54,7 @@ def test_run_finds_the_default_database(tmp_path, monkeypatch) -> None:
     empty = call("run", "exp3", "--no-report")
     assert empty.exit_code == 1
     assert "nothing to analyze: there is no database" in empty.stderr
+    assert "set PALPEBRA_DATA_FOLDER to" in " ".join(empty.stderr.split())
     make_database(tmp_path / "palpebra.sqlite", EXP3, simulate(EXP3, 6), participants=list("abcdef"))
     found = call("run", "exp3", "--no-report")
     assert found.exit_code == 0
@@ -147,14 +148,48 @@ def call_raising(*arguments: str) -> None:
 def test_an_unknown_study_is_refused_with_what_to_download(monkeypatch, capsys, tmp_path) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["analysis", "run", "motion"])
+    monkeypatch.delenv("DATABASE_URL", raising=False)
+    monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path / "elsewhere"))
     with pytest.raises(SystemExit) as end:
         run_command_line(app)
     assert end.value.code == 2
     told = capsys.readouterr().err
     assert told.startswith("error: no experiment 'motion'")
-    assert "timing-continuous, or the path of a TOML file. For a study made in the browser, open its" in told
-    assert "Design tab, download the definition and write motion.toml. With the CSV from its Data" in told
-    assert told.endswith("tab: analysis run motion.toml --csv FILE\n")
+    words = " ".join(told.split())
+    missing = f"There is no database at {tmp_path}/elsewhere/palpebra.sqlite to look for a study in"
+    assert f"or the path of a TOML file. {missing}; set PALPEBRA_DATA_FOLDER to the" in words
+    assert "its Design tab that downloads the definition (motion.toml), and give the path of" in words
+    assert words.endswith("With the CSV from its Data tab: analysis run motion.toml --csv FILE")
+
+
+def test_a_study_of_the_database_comes_before_a_file_of_its_name(tmp_path, monkeypatch) -> None:
+    """A name mistyped is answered with the database's own names."""
+    monkeypatch.delenv("DATABASE_URL", raising=False)
+    monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lids.toml").write_text("no definition")
+    with pytest.raises(
+        InputError,
+        match=r"^no experiment 'lids'; there is a file lids.toml here; to use it: analysis run lids.toml$",
+    ):
+        call_raising("run", "lids")
+    make_database(tmp_path / "palpebra.sqlite", EXP3, simulate(EXP3, 6), participants=list("abcdef"))
+    with closing(sqlite3.connect(tmp_path / "palpebra.sqlite")) as database, database:
+        database.execute(
+            "UPDATE study_versions SET definition_toml = ?", (locate("exp3").read_text("utf-8"),)
+        )
+        database.execute("UPDATE studies SET name = 'lids'")
+    found = call("run", "lids", "--no-report")
+    assert found.exit_code == 0, found.output
+    with pytest.raises(
+        InputError,
+        match=r"^no experiment or study 'lid'; did you mean 'lids'\? Studies in palpebra.sqlite: lids$",
+    ):
+        call_raising("run", "lid")
+    with pytest.raises(
+        InputError, match=r"a TOML file\. Studies in palpebra.sqlite: lids\. For a study made"
+    ):
+        call_raising("run", "motion")
 
 
 def test_a_seed_below_zero_is_a_usage_error() -> None:

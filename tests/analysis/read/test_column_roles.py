@@ -62,6 +62,19 @@ def test_groups_differ_from_factors_within(tmp_path: Path) -> None:
     assert found.command == "anova"
 
 
+@pytest.mark.parametrize("time", ["2026-11-30T09:0{}:00Z", "2026-11-30", "30.11.2026 09:0{}", "9:0{} PM"])
+def test_times_and_values_of_one_person_each_are_no_groups(time: str, tmp_path: Path) -> None:
+    rows = [
+        f"p{n},{time.format(n % 4)},2026-11-{n % 3 + 10},note {n % 7},{'xz'[n % 2]},{c},{400.5 + n * 7 + k}"
+        for n in range(8)
+        for k, c in enumerate("ab")
+    ]
+    header = "participant,started_at,completed_at,comment,hand,eye,rating"
+    found = guess(tmp_path, _long(header, rows))
+    expected = {"participant": "participant", "hand": "between", "eye": "within", "rating": "rating"}
+    assert roles(found) == expected
+
+
 def test_votes_on_many_clips_are_opinion_scores(tmp_path: Path) -> None:
     rows = [f"pvs{k},s{n},{1 + (n + k) % 5},0" for n in range(6) for k in range(30)]
     found = guess(tmp_path, _long("pvs_id,person,mos,repetition", rows))

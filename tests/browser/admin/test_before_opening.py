@@ -271,7 +271,9 @@ def test_every_page_of_a_study_says_its_step_and_what_comes_next(
     page = dashboard.open("/studies/short")
     steps = page.get_by_role("list", name="Steps of the study")
     expect(steps.locator("[aria-current=step]")).to_have_text("Live")
-    expect(page.get_by_role("link", name="Watch the participants: 3 complete.")).to_be_visible()
+    expect(
+        page.get_by_role("link", name="Follow the participants on the monitor (3 complete).")
+    ).to_be_visible()
 
 
 def test_the_monitor_renews_the_header_and_says_why_a_run_is_unlikely_a_persons(
@@ -281,12 +283,16 @@ def test_the_monitor_renews_the_header_and_says_why_a_run_is_unlikely_a_persons(
     with migrated_services(settings) as services:
         study = add_study(services, tmp_path, SHORT, name="watched")
     page = dashboard.open("/studies/watched/monitor")
-    expect(page.get_by_role("link", name="Watch the participants: 0 complete.")).to_be_visible()
+    expect(
+        page.get_by_role("link", name="Follow the participants on the monitor (0 complete).")
+    ).to_be_visible()
     with TestClient(create_app(settings)) as client:
         person = Participant(client, study.link_token).agree()
         person.answer_all()
         assert person.request("POST", "/complete").status_code == 200
-    expect(page.get_by_role("link", name="Watch the participants: 1 complete.")).to_be_visible()
+    expect(
+        page.get_by_role("link", name="Follow the participants on the monitor (1 complete).")
+    ).to_be_visible()
     with migrated_services(settings) as services, services.database.write() as session:
         watched = session.query(Study).filter_by(name="watched").one()
         run = session.query(StudyRun).filter_by(study_id=watched.id)

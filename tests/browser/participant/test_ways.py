@@ -127,7 +127,7 @@ def test_practice_comes_once_more_where_a_key_was_pressed_during_the_clip(served
     page.wait_for_selector("text=Please try this one again")
     page.keyboard.press("Enter")
     visit.rate("5")
-    page.wait_for_selector("text=Good, that is how it works")
+    page.wait_for_selector("text=Good. Please continue like this")
     page.keyboard.press("Enter")
     page.wait_for_selector("text=Practice is complete")
     assert visit.problems == []

@@ -273,7 +273,7 @@ function Page({ study, section, rendered }: { study: string; section: Section; r
     <Stack gap="sm">
       {section.id === "trial" && <TrialPreview />}
       {section.id === "factors" && builder.places !== null && <LevelGrid study={study} />}
-      {section.id === "screen" && <TurnedAway study={study} design={builder.design ?? undefined} />}
+      {section.id === "screen" && <TurnedAway study={study} design={builder.design ?? undefined} isHere />}
       {keys
         .map((key) => [key, EXPERIMENT.properties?.[key]] as const)
         .map(([key, schema]) =>

@@ -227,7 +227,8 @@ Verantwortlich: [Name, Einrichtung, E-Mail]. Ethikvotum: [Nummer].
 /** A template of the consent with what the study itself says in the place of its marks. */
 export function withKnown(text: string, { title, minutes }: { title: string; minutes: string }): string {
   const filled = (of: string, mark: RegExp, words: string) => (words === "" ? of : of.replaceAll(mark, () => words));
-  return filled(filled(text, /\[Tit(?:le|el)\]/g, title), /\[[mM]inut(?:es|en)\]/g, minutes);
+  const worded = minutes === "1" ? text.replaceAll("[minutes] minutes", "1 minute").replaceAll("[Minuten] Minuten", "1 Minute") : text;
+  return filled(filled(worded, /\[Tit(?:le|el)\]/g, title), /\[[mM]inut(?:es|en)\]/g, minutes);
 }
 
 /** The marks of a template that nobody has filled in. */

@@ -154,7 +154,7 @@ function Recruitment({ detail }: { detail: Schemas["StudyDetail"] }) {
           Recruitment
         </Title>
         <Select
-          label="1. Recruited through"
+          label={kind === null ? "Recruited through" : "1. Recruited through"}
           placeholder="nobody"
           clearable
           data={KINDS.map((value) => ({ value, label: RECRUITER_NAMES[value] ?? value }))}

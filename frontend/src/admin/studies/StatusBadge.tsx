@@ -14,10 +14,20 @@ export function StatusBadge({ status }: { status: Schemas["StudySummary"]["statu
 
 const SCREEN_PAGE = "Screen and playback";
 
+/** Which devices can take no part, for the page that changes it: without the sentence that names this page. */
+export const turnedAwayHere = (words: string) => words.replace(new RegExp(` [^.]*${SCREEN_PAGE}\\.$`), "");
+
+interface TurnedAwayProps {
+  study: string;
+  design: Schemas["DesignOut"] | undefined;
+  /** Whether it is on the page that changes it. */
+  isHere?: boolean;
+}
+
 /** Devices that can take no part, said before somebody sends them a link; the page that changes it is a link. */
-export function TurnedAway({ study, design }: { study: string; design: Schemas["DesignOut"] | undefined }) {
+export function TurnedAway({ study, design, isHere = false }: TurnedAwayProps) {
   if (!design?.turned_away) return null;
-  const [before = "", after] = design.turned_away.split(SCREEN_PAGE);
+  const [before = "", after] = (isHere ? turnedAwayHere(design.turned_away) : design.turned_away).split(SCREEN_PAGE);
   return (
     <Text size="sm">
       {before}
@@ -60,7 +70,7 @@ export function nextStep(
   if (paused) return { text: "The study is paused. Let participants begin under Settings.", page: "/settings" };
   if (status === "live")
     return {
-      text: `Watch the participants: ${String(complete)}${quota === null ? "" : ` of ${String(quota)}`} complete.`,
+      text: `Follow the participants on the monitor (${String(complete)}${quota === null ? "" : ` of ${String(quota)}`} complete).`,
       page: "/monitor",
     };
   if (status === "pilot")
