@@ -359,11 +359,16 @@ def _by_run(
     """The runs with rows of main trials, in the order they began; the first declaration has the groups."""
     factors, view = factor_names(session, study), view_of(session, study, extract)
     header = view.csv_header(factors)
-    between = {factor.name: header.index(factor.name) for factor in experiments[0].factors if factor.between}
+    groups = {factor.name: header.index(factor.name) for factor in experiments[0].factors if factor.between}
     of_cells = {factor.name for one in experiments for factor in one.factors if not factor.between}
-    within = {name: header.index(name) for name in of_cells if name not in between}
-    run, kind, trial, scale, response = (
-        header.index(name) for name in ("run", "kind", "trial_index", "scale", "response")
+    within = {name: header.index(name) for name in of_cells}
+    # A factor may be between participants in one version and within them in another.
+    between = {
+        version.number: {factor.name for factor in definition_of(version).factors if factor.between}
+        for version in repository.answered_versions(session, study, extract)
+    }
+    run, kind, trial, scale, response, version_at = (
+        header.index(name) for name in ("run", "kind", "trial_index", "scale", "response", "study_version")
     )
     rows = (view.csv_row(stored, factors) for stored in rating_rows(session, study, extract))
     for name, mine in groupby((row for row in rows if row[kind] == "main"), key=itemgetter(run)):
@@ -373,13 +378,19 @@ def _by_run(
             # one of its trial; a later one without an answer leaves the earlier standing.
             if row[response] is not None:
                 # Factors of other versions are empty.
-                levels = ((name, row[index]) for name, index in within.items())
+                levels = (
+                    (factor, row[index])
+                    for factor, index in within.items()
+                    if factor not in between[row[version_at]]
+                )
                 factor_levels = frozenset(
-                    (name, str(level)) for name, level in levels if level not in (None, "")
+                    (factor, str(level)) for factor, level in levels if level not in (None, "")
                 )
                 last[row[trial], row[scale]] = (factor_levels, float(row[response]))
-        groups = {factor: str(row[index]) for factor, index in between.items()}
-        yield _RunMeans(name, groups, len(last), _means(last))
+        # All rows of a run are of one version.
+        mine_between = between[row[version_at]]
+        of_run = {factor: str(row[index]) for factor, index in groups.items() if factor in mine_between}
+        yield _RunMeans(name, of_run, len(last), _means(last))
 
 
 def _means(answers: dict[tuple[Any, str], tuple[FactorLevels, float]]) -> Means:

@@ -56,31 +56,51 @@ def test_a_visit_without_answers_has_empty_cells(viewer: Admin, participant: Par
     assert row["rating_a_slow"] == row["form_about_age"] == ""
 
 
-def test_answers_of_an_earlier_data_series_keep_their_columns(
-    viewer: Admin, study: StudyInDatabase, participant: Participant, tmp_path: Path
-) -> None:
-    participant.agree()
-    participant.rate_all()
-    text = SHORT.replace('name = "fast"', 'name = "quick"')
+def filled(row: dict[str, Any]) -> set[str]:
+    return {name for name, value in row.items() if name.startswith("rating_") and value}
+
+
+def rate_in_next_version(study: StudyInDatabase, participant: Participant, text: str, folder: Path) -> None:
     changed, services = parse_experiment(text), study.services
-    manifest = make_clip_folder(changed, tmp_path / "changed", frames=4)
-    store_clips(services.clips, manifest, tmp_path / "changed")
+    manifest = make_clip_folder(changed, folder / "changed", frames=4)
+    store_clips(services.clips, manifest, folder / "changed")
     with services.database.write() as session:
         add_version(session, session.query(Study).one(), text, changed, manifest, None)
     later = Participant(participant.client, participant.link)
     later.agree()
     later.rate_all()
+
+
+SPEED = 'name = "speed"\nlabel = "Speed"\n'
+
+
+def test_answers_of_an_earlier_data_series_keep_their_columns(
+    viewer: Admin, study: StudyInDatabase, participant: Participant, tmp_path: Path
+) -> None:
+    participant.agree()
+    participant.rate_all()
+    rate_in_next_version(study, participant, SHORT.replace('name = "fast"', 'name = "quick"'), tmp_path)
     first, second = rows_of(viewer, "wide.csv")
     assert [row["data_series"] for row in (first, second)] == ["1", "2"]
-    rated = [
-        {name for name, value in row.items() if name.startswith("rating_") and value}
-        for row in (first, second)
-    ]
-    assert rated[0] == {"rating_a_slow", "rating_a_fast", "rating_b_slow", "rating_b_fast"}
-    assert rated[1] == {"rating_a_slow", "rating_a_quick", "rating_b_slow", "rating_b_quick"}
+    assert filled(first) == {"rating_a_slow", "rating_a_fast", "rating_b_slow", "rating_b_fast"}
+    assert filled(second) == {"rating_a_slow", "rating_a_quick", "rating_b_slow", "rating_b_quick"}
     assert "| rating_a_fast | number |" in viewer.get("/studies/short/data/codebook.md").text
     [alone] = rows_of(viewer, "wide.csv?series=2")
     assert "rating_a_fast" not in alone
+
+
+def test_a_factor_that_becomes_between_keeps_its_earlier_cells(
+    viewer: Admin, study: StudyInDatabase, participant: Participant, tmp_path: Path
+) -> None:
+    participant.agree()
+    participant.rate_all()
+    assert SPEED in SHORT
+    rate_in_next_version(study, participant, SHORT.replace(SPEED, f"{SPEED}between = true\n"), tmp_path)
+    first, second = rows_of(viewer, "wide.csv")
+    assert filled(first) == {"rating_a_slow", "rating_a_fast", "rating_b_slow", "rating_b_fast"}
+    assert filled(second) == {"rating_a", "rating_b"}
+    assert first["speed"] == ""
+    assert second["speed"] in ("slow", "fast")
 
 
 def test_a_cell_of_two_scales_has_the_range_of_both() -> None:
