@@ -101,6 +101,55 @@ def test_the_r_script_takes_the_newest_data_series(answers: Path, two_series: Pa
 
 
 @pytest.fixture(scope="module")
+def three_origins(answers: Path) -> Path:
+    """The answers as of participants, and other ones of pilots and simulations, some in a newer series."""
+    mine = pd.read_csv(answers, dtype=str, keep_default_na=False).assign(run_origin="participant")
+    parts = [mine]
+    for origin, series in (("pilot", "1"), ("simulated", "2")):
+        other = mine.assign(response="7", run_origin=origin, data_series=series)
+        parts.append(other.assign(participant=origin + other["participant"], run=origin + other["run"]))
+    file = answers.with_name("three-origins.csv")
+    pd.concat(parts).to_csv(file, index=False)
+    return file
+
+
+@pytest.mark.parametrize("kept", [("participant", "pilot", "simulated"), ("pilot", "simulated")])
+def test_the_python_script_takes_participants_before_pilots_before_simulations(
+    three_origins: Path, tmp_path: Path, kept: tuple[str, ...]
+) -> None:
+    rows = pd.read_csv(three_origins, dtype=str, keep_default_na=False)
+    rows = rows[rows["run_origin"].isin(kept)]
+    first = rows["run_origin"] == kept[0]
+    rows.to_csv(tmp_path / "all.csv", index=False)
+    rows[first].to_csv(tmp_path / "alone.csv", index=False)
+    target = tmp_path / "script.py"
+    target.write_text(script(EXP3, "py", "all.csv", series=2), encoding="utf-8")
+    every, alone = (
+        subprocess.run(
+            [sys.executable, "-W", "ignore", str(target), str(tmp_path / name)],
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        for name in ("all.csv", "alone.csv")
+    )
+    assert every.stdout == alone.stdout
+    said = f"Only answers of origin {kept[0]}; ignored rows of other origins: {(~first).sum()}."
+    assert said in every.stderr
+    assert "origin" not in alone.stderr
+
+
+def test_the_r_script_takes_participants_first(answers: Path, three_origins: Path) -> None:
+    needed("afex", "emmeans", "lme4")
+    said = []
+    for file in (answers, three_origins):
+        target = file.with_suffix(".R")
+        target.write_text(script(EXP3, "R", file.name), encoding="utf-8")
+        said.append(run(["Rscript", str(target)]))
+    assert f_of_r(said[0]) == f_of_r(said[1])
+
+
+@pytest.fixture(scope="module")
 def impure(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Experiment]:
     """Answers of which declared rules leave some out, as their rows show; those would change F."""
     rules = (ExcludeIncomplete(), DropFailedPlays(), DropSlowTrials(above_ms=9000))
