@@ -57,7 +57,7 @@ class AnswersQuery:
     def rows(self, further: Sequence[str], factors: Sequence[str]) -> pd.DataFrame:
         """Main and attention rows: text as categories, numbers float, a column per factor, a run's columns.
 
-        The columns of a run (`RUN_TEXTS`, `RUN_FLAGS`) are fetched once a run, not once a row.
+        The columns of a run (`RUN_TEXTS`, `RUN_FLAGS`) are fetched once per run, not once per row.
         """
         texts, numbers = self._reading.all_texts, (*self._reading.all_numbers, *further)
         levels = ("levels",) if self._reading.has_levels else ()
@@ -118,13 +118,14 @@ class AnswersQuery:
 def stored_definition(url: str, study: str, series: int | None, version: int | None) -> str | None:
     """The TOML text of a study in this database: the newest version of the only, or the given, data series.
 
-    None if there is no such database file or study, or these tables may not be read.
+    None if there is no such database file or study.
 
     Raises
     ------
     InputError
-        A URL that cannot be used, a database without connection, a series or version that the study does not
-        have, or several data series and none given: their definitions differ.
+        A URL that cannot be used, a database without connection or with tables that cannot be read, a series
+        or version that the study does not have, or several data series and none given: their definitions
+        differ.
     """
     rows = _selected(
         url,
@@ -184,31 +185,27 @@ def missing_file(url: URL) -> str | None:
 
 
 def _selected(url: str, selection: str, study: str) -> list[tuple[Any, ...]]:
-    """Rows of the server's own tables; none where there is no such database, or they may not be read.
+    """Rows of the server's own tables; none where there is no such database.
 
     Raises
     ------
     InputError
-        A URL that cannot be used, or a database without connection.
+        A URL that cannot be used, a database without connection, or tables that cannot be read.
     """
     name = _describe(url)
     engine = create_engine(with_driver(url))
     if missing_file(engine.url):
         return []
     query = text(f"SELECT {selection}")
+    values = {"study": study} if ":study" in selection else {}
     try:
-        connection = engine.connect()
+        with engine.connect() as connection:
+            return [tuple(row) for row in connection.execute(query, values)]
     except DBAPIError as error:
         raise InputError(
             f"'{study}' is not a shipped experiment, and studies cannot be looked up: cannot read {name}: "
             f"{_first_line(error)}"
         ) from error
-    try:
-        with connection:
-            values = {"study": study} if ":study" in selection else {}
-            return [tuple(row) for row in connection.execute(query, values)]
-    except DBAPIError:
-        return []
     finally:
         engine.dispose()
 

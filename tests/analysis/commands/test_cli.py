@@ -141,6 +141,16 @@ def test_a_database_without_connection_is_named_for_a_study_too() -> None:
         call_raising("run", "motion", "--database", "postgresql://me@127.0.0.1:1/lab")
 
 
+def test_a_database_whose_studies_cannot_be_read_is_named_with_the_cause(tmp_path) -> None:
+    file = tmp_path / "older.sqlite"
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute("CREATE TABLE studies (id INTEGER, name TEXT)")
+    words = "studies cannot be looked up: cannot read older.sqlite: no such table: study_versions"
+    with pytest.raises(InputError, match=words) as raised:
+        call_raising("run", "motion", "--database", f"sqlite:///{file}")
+    assert "\n" not in str(raised.value)
+
+
 def call_raising(*arguments: str) -> None:
     CliRunner().invoke(app, arguments, catch_exceptions=False)
 
