@@ -37,7 +37,7 @@ BANNED = {
     r"\bbeside(?!s)\b": "next to, in addition to, with",
     r"(?<!\ba )\bstands?\b(?! (?:for|still|up|out|alone|apart|guard)|-ins?\b)": "is, are",
     r"\bwhoever\b": "anyone who, people who",
-    r"\ba row an? |\bone an? (?:row|play|person|visit|cell)\b": "one row per ...",
+    r"\b(?:a|one) (?:row|column) an? |\bone an? (?:row|play|person|visit|cell)\b": "one row per ...",
     r"(?<!there )\b(?:is|are) no (?!longer|one\b|doubt|more|such)": "is not a ...",
     r"\bby its name\b": "by name",
     r"\bof (?:its|their|his|her|one's) own\b": "separate, its own ...",

@@ -181,7 +181,7 @@ def lid_degrees(distance_mm: Array) -> Array:
 
 
 def write_lids(path: Path, eyes: Sequence[tuple[BlinkSeries, float]], scale: Scale | None) -> None:
-    """Write every frame's distance, closure and, with a scale, mm and degrees, a column an eye.
+    """Write every frame's distance, closure and, with a scale, mm and degrees, a column per eye.
 
     `eyes` holds each series with its closed distance.
     """

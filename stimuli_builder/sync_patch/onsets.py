@@ -314,7 +314,7 @@ def rows_of_film(plays: Sequence[PlayOnScreen]) -> list[tuple[object, ...]]:
 
 
 def rows_of_trace(changes: Changes) -> list[tuple[object, ...]]:
-    """One row a change; which frame it was is not known."""
+    """One row per change; which frame it was is not known."""
     return [
         (number, "", round(at_ms, 3), "", round(step, 3) if step is not None else "", "")
         for number, times in enumerate(changes.plays, start=1)

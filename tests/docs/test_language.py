@@ -20,6 +20,7 @@ from tools.check_language import (
         ("It is read anew.", "anew"),
         ("The file stands beside it.", "beside"),
         ("The value is no number.", "is no"),
+        ("A table with a column an eye.", "a column an"),
         ("The colour of the iris.", "colour"),
         ("Labelled frames are analysed.", "Labelled"),
         ("Runs are randomised.", "randomised"),

@@ -151,7 +151,7 @@ const MAX_TICKS = 11;
 
 const shareOf = ({ share }: { share: number }) => (share >= 0.005 ? `${Math.round(100 * share)}%` : "");
 
-/** One row per cell, one column an answer: the share of answers as depth of color, and as a number. */
+/** One row per cell, one column per answer: the share of answers as depth of color, and as a number. */
 export function cellPlot({ cells, bins }: Results, factors: Factors): Plot.PlotOptions {
   const labels = cellLabels(
     cells.map(({ cell }) => cell),

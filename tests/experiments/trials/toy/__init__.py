@@ -63,7 +63,7 @@ TOY = Kind(
     answer=SameAnswer,
     view=View(
         name="sameness",
-        title="Sameness: one row a pair",
+        title="Sameness: one row per pair",
         columns=answer_columns(
             shown=(Column("first_cell", "text", "Cell of the clip shown first.", source="one.cell"),),
             answer=(
