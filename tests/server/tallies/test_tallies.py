@@ -101,7 +101,7 @@ def test_doctor_tells_of_wrong_counts_and_a_recount_mends_them(
     with services.database.write() as session:
         session.execute(update(RunTally).values(not_good=RunTally.not_good + 1))
     assert finding(services).verdict == "failed"
-    assert finding(services).state == "of 1 of 1 run differ from their ratings"
+    assert finding(services).state == "the stored counts of 1 of 1 run differ from their ratings"
     assert run_server_command(settings, "database", "recount").stdout == "1 run counted, 1 corrected\n"
     assert finding(services).verdict == "ok"
     with services.database.write() as session:
