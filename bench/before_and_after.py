@@ -108,7 +108,7 @@ def clips(folder: Path) -> dict[str, float]:
 def pages(folder: Path) -> dict[str, float]:
     """What each site loads at first, gzipped, counted by each revision, with the packages installed here."""
     frontend = Path("frontend").resolve()
-    if frontend != ROOT / "frontend":
+    if not (frontend / "node_modules").exists():  # an earlier revision, in its first round
         (frontend / "node_modules").symlink_to(ROOT / "frontend" / "node_modules")
         for site in SITES:
             vite = ["node_modules/.bin/vite", "build", "-c", f"vite.{site}.config.ts", "--logLevel", "error"]
