@@ -12,7 +12,6 @@ Of the project only what every revision has is used: the tests' own server and p
 import json
 import os
 import re
-import resource
 import statistics
 import subprocess
 import sys
@@ -21,6 +20,7 @@ import time
 from pathlib import Path
 
 import httpx2
+import psutil
 
 from bench.harness import ROOT, cpu_s_of, earlier_tree, figures_of, say, with_children
 from tests.browser.server_process import ServerProcess
@@ -81,7 +81,7 @@ def analysis(folder: Path) -> dict[str, float]:
 
 
 def commands(folder: Path) -> dict[str, float]:
-    """Processor time of each program's `--help`, and of an ANOVA of a table of 32 participants."""
+    """Processor time of each program's `--help`, and of an ANOVA of a table of 20 participants."""
     figures = {}
     for program in ("server", "stimuli_builder", "analysis"):
         ask = [sys.executable, "-c", f"from {program}.cli import main; main()", "--help"]
@@ -98,11 +98,11 @@ def commands(folder: Path) -> dict[str, float]:
 def clips(folder: Path) -> dict[str, float]:
     """Processor time of the 160 clips of Exp 3, built by one process with nothing cached."""
     build = [sys.executable, "-c", "from stimuli_builder.cli import main; main()", "build", "exp3"]
-    before = _processor_s_of_children()
+    before = cpu_s_of([psutil.Process()])
     subprocess.run(
         [*build, "--out", str(folder / "clips"), "--workers", "1"], check=True, stdout=subprocess.DEVNULL
     )
-    return {"clips of exp3 (s)": _processor_s_of_children() - before}
+    return {"clips of exp3 (s)": cpu_s_of([psutil.Process()]) - before}
 
 
 def pages(folder: Path) -> dict[str, float]:
@@ -126,17 +126,13 @@ TOTAL = re.compile(r"^ *([0-9]+)  .*gzipped; budget", re.MULTILINE)
 
 
 def _least_processor_s(command: list[str], folder: Path) -> float:
+    # Of this process, which only waits, with that of children which have ended.
     spent = []
     for _ in range(ANALYSES):
-        before = _processor_s_of_children()
+        before = cpu_s_of([psutil.Process()])
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=folder)
-        spent.append(_processor_s_of_children() - before)
+        spent.append(cpu_s_of([psutil.Process()]) - before)
     return min(spent)
-
-
-def _processor_s_of_children() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def _shortest(command: list[str], folder: Path) -> float:

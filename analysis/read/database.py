@@ -196,11 +196,9 @@ def _selected(url: str, selection: str, study: str) -> list[tuple[Any, ...]]:
     engine = create_engine(with_driver(url))
     if missing_file(engine.url):
         return []
-    query = text(f"SELECT {selection}")
-    values = {"study": study} if ":study" in selection else {}
     try:
         with engine.connect() as connection:
-            return [tuple(row) for row in connection.execute(query, values)]
+            return [tuple(row) for row in connection.execute(text(f"SELECT {selection}"), {"study": study})]
     except DBAPIError as error:
         raise InputError(
             f"'{study}' is not a shipped experiment, and studies cannot be looked up: cannot read {name}: "

@@ -3,6 +3,7 @@
 import json
 import sqlite3
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -104,16 +105,19 @@ def test_run_of_an_empty_export_exits_1(tmp_path) -> None:
     assert "has a header but no ratings yet" in result.stderr
 
 
-def test_a_study_in_the_database_is_analysed_by_its_name(tmp_path, monkeypatch) -> None:
-    monkeypatch.delenv("DATABASE_URL", raising=False)
-    monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path))
-    people = list("abcdef")
-    make_database(tmp_path / "palpebra.sqlite", EXP3, simulate(EXP3, 6), participants=people)
-    with closing(sqlite3.connect(tmp_path / "palpebra.sqlite")) as database, database:
+def _store_exp3_as(name: str, file: Path) -> None:
+    make_database(file, EXP3, simulate(EXP3, 6), participants=list("abcdef"))
+    with closing(sqlite3.connect(file)) as database, database:
         database.execute(
             "UPDATE study_versions SET definition_toml = ?", (locate("exp3").read_text("utf-8"),)
         )
-        database.execute("UPDATE studies SET name = 'motion'")
+        database.execute("UPDATE studies SET name = ?", (name,))
+
+
+def test_a_study_in_the_database_is_analysed_by_its_name(tmp_path, monkeypatch) -> None:
+    monkeypatch.delenv("DATABASE_URL", raising=False)
+    monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path))
+    _store_exp3_as("motion", tmp_path / "palpebra.sqlite")
     found = call("run", "motion", "--no-report")
     assert found.exit_code == 0, found.output
     assert "6 participants, from palpebra.sqlite" in found.stdout
@@ -183,12 +187,7 @@ def test_a_study_of_the_database_comes_before_a_file_of_its_name(tmp_path, monke
         match=r"^no experiment 'lids'; there is a file lids.toml here; to use it: analysis run lids.toml$",
     ):
         call_raising("run", "lids")
-    make_database(tmp_path / "palpebra.sqlite", EXP3, simulate(EXP3, 6), participants=list("abcdef"))
-    with closing(sqlite3.connect(tmp_path / "palpebra.sqlite")) as database, database:
-        database.execute(
-            "UPDATE study_versions SET definition_toml = ?", (locate("exp3").read_text("utf-8"),)
-        )
-        database.execute("UPDATE studies SET name = 'lids'")
+    _store_exp3_as("lids", tmp_path / "palpebra.sqlite")
     found = call("run", "lids", "--no-report")
     assert found.exit_code == 0, found.output
     with pytest.raises(

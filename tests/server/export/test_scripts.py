@@ -90,16 +90,6 @@ def test_the_python_script_takes_the_data_series_of_its_declaration(
     assert said[0] == said[1]
 
 
-def test_the_r_script_takes_the_newest_data_series(answers: Path, two_series: Path) -> None:
-    needed("afex", "emmeans", "lme4")
-    said = []
-    for file in (answers, two_series):
-        target = file.with_suffix(".R")
-        target.write_text(script(EXP3, "R", file.name), encoding="utf-8")
-        said.append(run(["Rscript", str(target)]))
-    assert f_of_r(said[0]) == f_of_r(said[1])
-
-
 @pytest.fixture(scope="module")
 def three_origins(answers: Path) -> Path:
     """The answers as of participants, and other ones of pilots and simulations, some in a newer series."""
@@ -139,10 +129,13 @@ def test_the_python_script_takes_participants_before_pilots_before_simulations(
     assert "origin" not in alone.stderr
 
 
-def test_the_r_script_takes_participants_first(answers: Path, three_origins: Path) -> None:
+@pytest.mark.parametrize("more", ["two_series", "three_origins"])
+def test_the_r_script_takes_the_newest_series_and_participants_first(
+    answers: Path, request: pytest.FixtureRequest, more: str
+) -> None:
     needed("afex", "emmeans", "lme4")
     said = []
-    for file in (answers, three_origins):
+    for file in (answers, request.getfixturevalue(more)):
         target = file.with_suffix(".R")
         target.write_text(script(EXP3, "R", file.name), encoding="utf-8")
         said.append(run(["Rscript", str(target)]))
