@@ -24,6 +24,9 @@ class Disturbances(Declaration):
     """The window became smaller than the clip."""
     clip_cut_off: Consequence = "flag"
     """Part of the clip was outside the window."""
+    clip_scaled_down: Consequence = "flag"
+    """The clip has no measured size and is wider than the window, so it was shown smaller than its own
+    pixels."""
     zoomed: Consequence = "flag"
     """The page was zoomed or moved to another screen, during the clip or before its start key: the size is
     wrong."""

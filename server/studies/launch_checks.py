@@ -335,8 +335,8 @@ def _clip_size(launch: LaunchState) -> Iterator[LaunchCheck]:
             blocks=False,
             text=(
                 f"Clips are up to {width} x {height} pixels, but the study starts in windows from "
-                f"{display.minimum_width_px} x {display.minimum_height_px} pixels, where they are cut off. "
-                "Increase the minimum width and height, or use smaller clips."
+                f"{display.minimum_width_px} x {display.minimum_height_px} pixels, where they are scaled "
+                "down or cut off. Increase the minimum width and height, or use smaller clips."
             ),
             page="build",
             path="display.minimum_width_px",

@@ -1263,6 +1263,11 @@ export interface components {
    * @default flag
    * @enum {string}
    */
+   clip_scaled_down: "ignore" | "flag" | "repeat";
+   /**
+   * @default flag
+   * @enum {string}
+   */
    zoomed: "ignore" | "flag" | "repeat";
    /**
    * @default flag
@@ -1566,6 +1571,7 @@ export interface components {
    *       "flag_video_fallback": true,
    *       "disturbances": {
    *         "clip_cut_off": "flag",
+   *         "clip_scaled_down": "flag",
    *         "full_screen_left": "flag",
    *         "refresh_dropped": "flag",
    *         "scale_reloaded": "flag",
@@ -2443,6 +2449,7 @@ export interface components {
    *       "full_screen_left": "flag",
    *       "window_too_small": "flag",
    *       "clip_cut_off": "flag",
+   *       "clip_scaled_down": "flag",
    *       "zoomed": "flag",
    *       "refresh_dropped": "flag",
    *       "scale_reloaded": "flag"

@@ -164,10 +164,10 @@ describe("disturbances", () => {
   const box = { left: 100, top: 100, right: 300, bottom: 200 };
 
   it("takes the share of the clip inside the window", () => {
-    expect(visibleShare(box, 1280, 800)).toBe(1);
-    expect(visibleShare(box, 200, 800)).toBe(0.5);
-    expect(visibleShare(box, 200, 150)).toBe(0.25);
-    expect(visibleShare(box, 50, 50)).toBe(0);
+    const seen = (right: number, bottom: number) => visibleShare(box, { left: 0, top: 0, right, bottom });
+    expect([seen(1280, 800), seen(200, 800), seen(200, 150), seen(50, 50)]).toEqual([1, 0.5, 0.25, 0]);
+    // Of a page that fingers have zoomed and moved.
+    expect(visibleShare(box, { left: 200, top: 100, right: 712, bottom: 420 })).toBe(0.5);
   });
 
   it("counts one leaving of full screen once, however many clips come after it", () => {

@@ -244,6 +244,40 @@ def test_a_clip_without_a_measured_size_follows_the_window_until_its_start(
     expect(clip).to_have_css("width", f"{width}px")
 
 
+def in_window_of(page: Page, width: int, height: int) -> None:
+    """The window alone: Playwright would change the screen's size with it."""
+    screen = {"screenWidth": 1920, "screenHeight": 1200, "deviceScaleFactor": 1, "mobile": False}
+    changed = {"width": width, "height": height, **screen}
+    page.context.new_cdp_session(page).send("Emulation.setDeviceMetricsOverride", changed)
+    page.wait_for_function(f"innerWidth === {width} && innerHeight === {height}")
+
+
+def zoomed_by_fingers(page: Page, scale: float) -> None:
+    page.context.new_cdp_session(page).send("Emulation.setPageScaleFactor", {"pageScaleFactor": scale})
+    page.wait_for_function(f"Math.abs(visualViewport.scale - {scale}) < 0.01")
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "seen"),
+    [(200, 800, {"clip_scaled_down"}), (1280, 70, {"window_too_small", "clip_cut_off"})],
+)
+def test_a_clip_larger_than_the_window_is_not_good(
+    studies: Served, window: Page, width: int, height: int, seen: set[str]
+) -> None:
+    studies.visit("short_clips", window)
+    in_window_of(window, width, height)
+    assert disturbed_view(studies, window, lambda _: None, 1, before=True) == seen
+
+
+def test_a_clip_that_fingers_had_zoomed_before_its_trial_is_not_good(studies: Served, window: Page) -> None:
+    studies.visit("short_clips", window)
+    zoomed_by_fingers(window, 2.5)
+    for number in (1, 2):
+        # The second trial begins in a page that is zoomed already: nothing changes any more.
+        seen = disturbed_view(studies, window, lambda _: None, number)
+        assert seen == {"zoomed", "clip_cut_off"}
+
+
 def leave_full_screen(page: Page) -> None:
     page.evaluate("document.exitFullscreen()")
     # Asked from outside: the page's policy lets no function be waited for that is not true at once.

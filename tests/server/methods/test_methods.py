@@ -283,6 +283,7 @@ def test_every_clip_was_drawn_only_where_every_play_was(
     person.rate(mains[0], play=2)
     person.rate(mains[1], playback={"method": "video", "clock_gap_ms": None, "drawn": None})
     person.rate(mains[2], playback={"frames_missing": 1, "frames_drawn": 3})
+    person.rate(mains[3], playback={"disturbances": {"clip_scaled_down": 1}})
     person.answer_all()
     assert person.request("POST", "/complete").status_code == 200
     said = paragraph(viewer)
@@ -292,8 +293,9 @@ def test_every_clip_was_drawn_only_where_every_play_was(
         "drawn frame by frame in 15, shown by the browser's video element in one, and not shown at all "
         "in one." in said
     )
-    assert "two were flagged (" in said
+    assert "three were flagged (" in said
     assert "missing frames: one" in said
+    assert "clip scaled down: one" in said
     found = values(viewer, services)
     assert (found["plays"], found["plays_by_frame"], found["plays_not_drawn"]) == (17, 15, 1)
 

@@ -126,7 +126,8 @@ function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: number }) 
           </Text>
         )}
         <Text size="sm" c="dimmed">
-          Flagged or failed: frames were missing or late, or the page was left, zoomed or reloaded. Failed clips are repeated.
+          Flagged or failed: frames were missing or late, the clip did not fit the window, or the page was left, zoomed or reloaded. Failed
+          clips are repeated.
         </Text>
       </Stack>
     </Card>

@@ -15,6 +15,10 @@ export interface Size {
   width: number;
   height: number;
 }
+interface Fitted extends Size {
+  /** Smaller than its own pixels, since the window is narrower. */
+  is_scaled_down: boolean;
+}
 export interface Stage {
   element: HTMLElement;
   /** Where the prompt, the scale and the feedback appear, below the clip. */
@@ -22,37 +26,42 @@ export interface Stage {
   setPlaying(playing: boolean): void;
   /** Give the clip its size in the window as it is now. */
   fit: () => void;
+  isScaledDown: () => boolean;
   layout: Layout;
 }
 
-function stage(clip: HTMLElement, size: () => Size, name: string): Stage {
+function stage(clip: HTMLElement, size: () => Fitted, name: string): Stage {
   const marks = ["tl", "tr", "bl", "br"].map((corner) => h("i", { class: `mark mark-${corner}` }));
   const frame = h("div", { class: "clip", role: "img", "aria-label": name }, clip, ...marks);
+  let scaled_down = false;
   const fit = (): void => {
-    const { width, height } = size();
+    const { width, height, is_scaled_down } = size();
+    scaled_down = is_scaled_down;
     frame.style.width = `${width}px`;
     frame.style.height = `${height}px`;
   };
   fit();
   const below = h("div", { class: "below" });
   const element = h("section", { class: "trial" }, h("div", { class: "above" }), frame, below);
-  return { element, below, setPlaying: (playing) => element.classList.toggle("playing", playing), fit, layout: layout() };
+  const setPlaying = (playing: boolean): void => void element.classList.toggle("playing", playing);
+  return { element, below, setPlaying, fit, isScaledDown: () => scaled_down, layout: layout() };
 }
 
-/** Actual size, whatever the window is; where no size was measured it is at most as wide as the window. */
-export function inWindow({ screen }: Session, { width, height }: Size): Size {
-  const scale = screen.px_per_mm === null ? Math.min(1, window.innerWidth / width) : 1;
-  return { width: width * scale, height: height * scale };
+/** Actual size, whatever the window is; where no size was measured it is at most as wide as the window. `own` is its width in its own pixels. */
+export function inWindow({ screen }: Session, { width, height }: Size, own = width): Fitted {
+  if (screen.px_per_mm !== null) return { width, height, is_scaled_down: false };
+  const scale = Math.min(1, window.innerWidth / width);
+  return { width: width * scale, height: height * scale, is_scaled_down: Math.round(width * scale) < own };
 }
 
 /** The size of one clip. */
-export function clipSize(session: Session, trial: TrialInfo): Size {
+export function clipSize(session: Session, trial: TrialInfo): Fitted {
   const width = clipWidth(trial, session.run.display.inter_ocular_mm, session.screen.px_per_mm);
   return inWindow(session, { width, height: clipHeight(trial, width) });
 }
 
 /** The place of clips of this size, with the way out, as all that is on the screen. */
-export function showStage(session: Session, display: HTMLElement, size: () => Size, name: MessageKey = "clip_name"): Stage {
+export function showStage(session: Session, display: HTMLElement, size: () => Fitted, name: MessageKey = "clip_name"): Stage {
   const clipStage = stage(session.player.element, size, session.t(name));
   clipStage.element.append(stopButton(session));
   display.replaceChildren(clipStage.element);
@@ -134,7 +143,7 @@ export async function showOnce(
     const shown = await player.play(sha256, { fixation_ms, refresh_ms, ready: kept });
     const { counts, focus_lost, visible_share } = watched.stop();
     const dropped = screen.refresh_rate_hz !== null && refreshDropped(shown.refresh_ms, refresh_ms);
-    const disturbances = dropped ? { ...counts, refresh_dropped: 1 } : counts;
+    const disturbances = { ...counts, ...(stage.isScaledDown() && { clip_scaled_down: 1 }), ...(dropped && { refresh_dropped: 1 }) };
     return { ...shown, key_at_ms, focus_lost, visible_share, disturbances, early_keys };
   } finally {
     // Also where the play has failed: nothing is watched beyond it.

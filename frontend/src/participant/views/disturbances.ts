@@ -22,13 +22,13 @@ const SAME_ZOOM = 0.001;
 /** A refresh this much longer than before is another rate, not a hiccup. */
 const DROPPED = 1.4;
 
-/** Share of a box inside a window of this size, 0 to 1. */
-export function visibleShare({ left, top, right, bottom }: Box, width: number, height: number): number {
+/** Share of a box inside another, 0 to 1. */
+export function visibleShare({ left, top, right, bottom }: Box, seen: Box): number {
   const area = (right - left) * (bottom - top);
   // An element without a size is not laid out: nothing of it can be cut off.
   if (area <= 0) return 1;
-  const across = Math.max(0, Math.min(right, width) - Math.max(left, 0));
-  const down = Math.max(0, Math.min(bottom, height) - Math.max(top, 0));
+  const across = Math.max(0, Math.min(right, seen.right) - Math.max(left, seen.left));
+  const down = Math.max(0, Math.min(bottom, seen.bottom) - Math.max(top, seen.top));
   return Math.min(1, (across * down) / area);
 }
 
@@ -37,6 +37,15 @@ export function refreshDropped(refresh_ms: number | null, expected_ms: number): 
   return refresh_ms !== null && refresh_ms > expected_ms * DROPPED;
 }
 
+/** What is on the screen of the page, which is less than the window where fingers have zoomed in. */
+function seenPart(): Box {
+  const view = window.visualViewport;
+  if (!view || view.scale <= 1) return { left: 0, top: 0, right: window.innerWidth, bottom: window.innerHeight };
+  const { offsetLeft: left, offsetTop: top } = view;
+  return { left, top, right: left + view.width, bottom: top + view.height };
+}
+
+/** Of fingers as well: they zoom without another layout, so the size is wrong also where they did so before the trial. */
 const zoom = (): number => window.devicePixelRatio * (window.visualViewport?.scale ?? 1);
 /** The same on a screen that is turned, another on most other screens. */
 const sides = (): number => screen.width + screen.height;
@@ -48,7 +57,7 @@ export interface Layout {
   fullscreenElement: Element | null;
 }
 
-export const layout = (): Layout => ({ zoom: zoom(), sides: sides(), fullscreenElement: document.fullscreenElement });
+export const layout = (): Layout => ({ zoom: window.devicePixelRatio, sides: sides(), fullscreenElement: document.fullscreenElement });
 
 /** Watch the window around `clip` from now until `stop`. It listens only: asking at each refresh costs frames. */
 export function watchDisturbances(clip: HTMLElement, before: Layout): { stop: () => Disturbed } {
@@ -66,7 +75,7 @@ export function watchDisturbances(clip: HTMLElement, before: Layout): { stop: ()
     const is_small = window.innerWidth < Math.floor(box.width) || window.innerHeight < Math.floor(box.height);
     if (is_small && !small) add("window_too_small");
     small = is_small;
-    const share = visibleShare(box, window.innerWidth, window.innerHeight);
+    const share = visibleShare(box, seenPart());
     if (share < WHOLE_SHARE && visible_share >= WHOLE_SHARE) add("clip_cut_off");
     visible_share = Math.min(visible_share, share);
     const is_zoomed = Math.abs(zoom() - before.zoom) > SAME_ZOOM || sides() !== before.sides;
@@ -81,6 +90,7 @@ export function watchDisturbances(clip: HTMLElement, before: Layout): { stop: ()
   window.addEventListener("resize", look, { signal });
   window.addEventListener("scroll", look, { signal, passive: true });
   window.visualViewport?.addEventListener("resize", look, { signal });
+  window.visualViewport?.addEventListener("scroll", look, { signal });
   document.addEventListener("fullscreenchange", look, { signal });
   return {
     stop() {

@@ -108,7 +108,7 @@ export async function stageFor(session: Session, display: HTMLElement, trial: Tr
     const room = { width: window.innerWidth, height: window.innerHeight };
     const layout = layoutOf(presentation, pixels, shown, room, px_per_mm);
     if (layout) {
-      return { stage: showStage(session, display, () => inWindow(session, layout.shown), "pair_name"), layout };
+      return { stage: showStage(session, display, () => inWindow(session, layout.shown, layout.canvas.width), "pair_name"), layout };
     }
     await askRoom(session, display, "", roomNeeded(presentation, shown, px_per_mm));
   }
