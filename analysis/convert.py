@@ -148,7 +148,7 @@ def _cut(text: str, limit: int) -> str:
 
 
 def write_parquet(frame: pd.DataFrame, columns: Columns, target: Path) -> None:
-    """Write a .parquet file; its metadata has a key a column, with its description."""
+    """Write a .parquet file; its metadata has one key per column, with its description."""
     from fastparquet import write
 
     described = {column.name: column.description for column in columns}

@@ -4,7 +4,7 @@ Part of `make bench`; alone: python -m pytest bench/bench_blinks.py -o python_fi
 
 Blink labels of tracked video against the synthetic actor's plan: the table of docs/explanation/tracking.md.
 
-    python -m bench.bench_blinks [seconds of actor a seed, default 90] [folder that keeps the drawings]
+    python -m bench.bench_blinks [seconds of actor per seed, default 90] [folder that keeps the drawings]
 
 Seeds 2, 3 and 4 are drawn, tracked with 20 exactly labeled frames and labeled, both eyes. Truth: 5% of the
 amplitude, apex and 95% recovery of the plan, in fractions of a frame at 300 frames/s. Every blink of the plan

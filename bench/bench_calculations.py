@@ -173,7 +173,7 @@ def test_an_hour_at_once_and_frame_by_frame(benchmark):
     frame_us = least_cpu_s(one_by_one) / 36_000 * 1e6
     sys.stdout.write(
         f"\nblink engine: {FRAMES / at_once / 1e6:.1f} million frames/s at once (must {MUST_PER_S / 1e6:g}), "
-        f"{at_once / baseline:.1f} times a sine and a power of as many numbers; {frame_us:.1f} us a frame "
+        f"{at_once / baseline:.1f} times a sine and a power of as many numbers; {frame_us:.1f} us per frame "
         "one by one\n"
     )
     benchmark.extra_info["times_baseline"] = at_once / baseline

@@ -44,7 +44,7 @@ class Throughput:
 
     @property
     def cost_ms(self) -> float:
-        """The sender's processor time a clip."""
+        """The sender's processor time per clip."""
         return 1000 * self.sender_s / max(1, self.clips)
 
     @property
@@ -70,7 +70,7 @@ def proxied_clips(seconds: float, ratio: float) -> list[Row]:
         with nginx(program, Path(folder), server.port) as proxy:
             proxied = measured(proxy.port, paths, seconds, proxy.cpu_s)
     times = proxied.per_core_s / own.per_core_s
-    what = "clips/s; sender's processor time a clip (ms); driver's share of the cores (%)"
+    what = "clips/s; sender's processor time per clip (ms); driver's share of the cores (%)"
     return [
         Row(
             f"clips of {CLIP_BYTES / 1000:.0f} kB, {CONNECTIONS} connections",

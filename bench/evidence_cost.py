@@ -3,7 +3,7 @@
     python -m bench.evidence_cost [rounds, default 10]
 
 A real server on SQLite with clips as large as those of Experiment 3; in each round one simulated person
-rates with ticket, digest and presses and has tickets with her views, and one brings nothing. Prints CPU a
+rates with ticket, digest and presses and has tickets with her views, and one brings nothing. Prints CPU per
 rating of both, alone and with the two writes of its view, and the median of the rounds' ratios.
 """
 
@@ -65,7 +65,7 @@ def main(rounds: int) -> None:
 def rated(
     process: ServerProcess, token: str, number: int, clips: dict[str, bytes], *, evidence: bool
 ) -> tuple[float, float]:
-    """CPU seconds of the server a rating, alone and with its view, of one person who rates everything."""
+    """CPU seconds of the server per rating, alone and with its view, of one person who rates everything."""
     client = JsonClient(process.address)
     person = Person(client, Rater(2 * number + evidence, 1, {}))
     person.brings_evidence = evidence

@@ -95,7 +95,7 @@ def measure_label_free() -> None:
         say(f"{name}: {info.frame_count} frames, {labels.eyes} eye(s), {len(labels.frames)} labeled")
         begun = time.perf_counter()
         seen = survey(info, one_eye=one_eye)
-        say(f"  detector  {(time.perf_counter() - begun) / seen.looked_at * 1000:.0f} ms a frame")
+        say(f"  detector  {(time.perf_counter() - begun) / seen.looked_at * 1000:.0f} ms per frame")
         say_lids("detector", seen.points, labels.frames, labels.markers)
         lesson = label_free_lesson(info, seen, TrainingOptions(), one_eye=one_eye)
         with tempfile.TemporaryDirectory() as bare:

@@ -77,7 +77,7 @@ def timed(call: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def measure(client: TestClient, upload: str) -> None:
-    """Print one line a request."""
+    """Print one line per request."""
     baseline, _ = timed(lambda: client.get(f"/api/admin/uploads/{upload}"))
     body = {
         "name": "many",

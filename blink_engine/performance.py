@@ -168,7 +168,7 @@ class Hold:
 
 @dataclass(frozen=True, eq=False)
 class Performance:
-    """Lid curves of both eyes at `fps`: each array has a value a frame, as in `LidFrame`."""
+    """Lid curves of both eyes at `fps`: each array has one value per frame, as in `LidFrame`."""
 
     fps: float
     left: Array

@@ -65,10 +65,10 @@ class LevelLeak:
 
     def __str__(self) -> str:
         return (
-            f"clips of the level '{self.level}' of '{self.factor}' differ from the others in the "
-            f"{self.feature}: by this alone, {self.right:.0%} of them and {self.others:.0%} of the others "
-            f"are recognized ({self.clips} clips). If '{self.factor}' varies it on purpose, leave it. "
-            f"Otherwise raters may judge it instead: make all levels with the same {self.feature}"
+            f"the {self.feature} reveals the level '{self.level}' of '{self.factor}': it alone is enough to "
+            f"classify {self.right:.0%} of the clips of this level and {self.others:.0%} of the other clips "
+            f"correctly ({self.clips} clips). If '{self.factor}' changes it on purpose, ignore this. "
+            f"Otherwise raters may judge it instead: give all levels the same {self.feature}"
         )
 
 

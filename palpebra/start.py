@@ -28,7 +28,6 @@ DEMO_NAME = "demo"
 DEMOS = (DEMO_NAME, "exp3")
 """Studies that the first page offers to try: that of the package, or that of `make run`."""
 LOCK = "palpebra.lock"
-SECONDS_TO_START = 60
 
 Page = Callable[["Welcome", Path], str]
 """From the links and the data folder to the path that the browser opens."""
@@ -122,7 +121,7 @@ def serve_folder(
     with_browser: bool = False,
     around: Callable[[], AbstractContextManager[None]] = nullcontext,
 ) -> None:
-    """Prepare the data folder, print where to go, and serve until stopped.
+    """Prepare the data folder, serve until stopped, and print where to go as soon as the server answers.
 
     Parameters
     ----------
@@ -148,17 +147,21 @@ def serve_folder(
         # A browser on this machine; under a domain, the address that everybody uses.
         local = public_url if public_url.startswith("https://") else f"http://localhost:{port}"
         address = local + page(welcome, place)
-        print_links(welcome, public_url)
         typer.echo(f"Data folder: {place}")
         if place != default_folder():
             typer.echo(f"For commands on these data: export {DATA_VARIABLE}={shlex.quote(str(place))}")
-        # On a line alone, so that it can be copied, with room to the log that follows.
-        typer.secho(f"\nOpen {address}\n", bold=True)
-        typer.echo("Stop with Ctrl-C.")
+
+        def say_where() -> None:
+            print_links(welcome, public_url)
+            # On a line alone, so that it can be copied, with room to the log that follows.
+            typer.secho(f"\nOpen {address}\n", bold=True)
+            typer.echo("Stop with Ctrl-C.")
+            if with_browser and not (os.environ.get("BROWSER") == "none" or webbrowser.open(address)):
+                typer.echo(f"No browser was found. Open {address} yourself.")
+
         with around():
-            if with_browser:
-                threading.Thread(target=_open_when_ready, args=(address, port), daemon=True).start()
-            run(port=port)
+            threading.Thread(target=_call_when_ready, args=(port, say_where), daemon=True).start()
+            run(port=port, welcome=False)
 
 
 def _prepare(place: Path) -> None:
@@ -173,7 +176,7 @@ def _prepare(place: Path) -> None:
     elif is_new:
         from server.studies.cli import add
 
-        add(str(DEMO / "demo.toml"), DEMO, name=DEMO_NAME, open_=True)
+        add(str(DEMO / "demo.toml"), DEMO, name=DEMO_NAME, open_=True, link=False)
 
 
 @contextmanager
@@ -196,14 +199,12 @@ def only_server_of(place: Path) -> Iterator[None]:
         ) from error
 
 
-def _open_when_ready(address: str, port: int) -> None:
-    until = time.monotonic() + SECONDS_TO_START
-    while time.monotonic() < until:
+def _call_when_ready(port: int, action: Callable[[], None]) -> None:
+    """Wait until the server answers. Links that are printed earlier lead to an error page."""
+    while True:
         try:
             urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=2).close()
         except (urllib.error.URLError, OSError):
             time.sleep(0.2)
             continue
-        if not (os.environ.get("BROWSER") == "none" or webbrowser.open(address)):
-            typer.echo(f"No browser was found. Open {address} yourself.")
-        return
+        return action()

@@ -108,7 +108,7 @@ def clock_of(stamps: Stamps, tick_s: float, usual_step_s: float) -> Clock:
 
 
 def _clock_packets(path: Path, container: Any, stream: Any) -> tuple[Stamps, float, float]:
-    """Stamps of the video's frames, seconds a tick, and where the last packet of any stream ends."""
+    """Stamps of the video's frames, seconds per tick, and where the last packet of any stream ends."""
     times, timeless = array("q"), False
     reached_s = 0.0
     # The declared length counts from the first stamp, which need not be 0.

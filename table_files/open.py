@@ -122,7 +122,7 @@ def _looks_like_json(path: Path) -> bool:
     return re.match(rb'\s*(\{\s*["}]|\[\s*[\[{\]])', start) is not None
 
 
-# JSON as programs for experiments write it: a list of objects, one a trial; or lines of such JSON.
+# JSON as programs for experiments write it: a list of objects, one per trial; or lines of such JSON.
 
 _LARGEST = 2**63 - 1
 

@@ -28,6 +28,24 @@ MEDIAN_GRADE, HIGHEST_GRADE = 10.0, 14.0
 """Reading grades of pages with text: the median, and the hardest page."""
 REFERENCE = ("docs/reference/columns.md", "docs/reference/settings.md", "docs/reference/experiment.md")
 """Tables written from the code: their grade says nothing."""
+_EACH = (
+    r"an? (?:declared )?(?:answer|bar|block|cell|character|clip|column|comparison|condition|effect|eye|"
+    r"factor|file|frame|group|inch|item|key|kind|level|line|mm|option|page|pair|participant|person|pixel|play|point|"
+    r"question|rater|rating|reason|recording|request|row|rule|run|scale|series|session|statement|study|table|"
+    r"text|trial|video|visit|worker)"
+)
+_COUNTED = (
+    "bit|byte|check|clip|column|curve|digit|effect|field|file|intercept|key|letter|line|log|module|note|number|"
+    "object|panel|paragraph|picture|pixel|point|profile|rating|record|row|sample|section|sentence|statement|"
+    "table|value|variance|view"
+)
+_SENTENCE_GOES_ON = r"(?=\s*(?:[^\w\s'’]|$)|\s+(?:and|as|at|for|from|in|of|on|that|where|with)\b)"
+PER_EACH = (
+    rf"\b(?:an?|one|two|three|four|ten|\d+) (?:[\w-]+ )?(?:{_COUNTED})s? {_EACH}\b{_SENTENCE_GOES_ON}|"
+    rf"(?<!makes )(?<!call )\bone {_EACH}\b(?=\s*(?:[^\w\s,'’]|$))|"
+    rf"\b(?:px|pixels|bytes|bits) {_EACH}\b|\b(?:a|one) (?:row|column) an? (?!separate|few|time)"
+)
+"""`a value an eye` for `one value per eye`; but `the value an eye reaches` is right: a verb follows."""
 BANNED = {
     r"\btold\b|\btells?\b(?! (?:people|apart))": "reported, shown, detected, identified",
     r"\banew\b": "again",
@@ -37,7 +55,7 @@ BANNED = {
     r"\bbeside(?!s)\b": "next to, in addition to, with",
     r"(?<!\ba )\bstands?\b(?! (?:for|still|up|out|alone|apart|guard)|-ins?\b)": "is, are",
     r"\bwhoever\b": "anyone who, people who",
-    r"\b(?:a|one) (?:row|column) an? |\bone an? (?:row|play|person|visit|cell)\b": "one row per ...",
+    PER_EACH: "one ... per ...",
     r"(?<!there )\b(?:is|are) no (?!longer|one\b|doubt|more|such)": "is not a ...",
     r"\bby its name\b": "by name",
     r"\bof (?:its|their|his|her|one's) own\b": "separate, its own ...",

@@ -39,7 +39,7 @@ their unit in the name or the meaning. A text in several languages is a table: `
 
 
 def experiment_reference(made: str) -> Iterator[str]:
-    """The page's lines: a section a table of the TOML, with one row per key."""
+    """The page's lines: one section per table of the TOML, with one row per key."""
     yield from (made, "# The declaration of a study", "", INTRODUCTION)
     examples = Examples()
     for heading, model, path in tables():

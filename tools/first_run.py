@@ -73,7 +73,15 @@ def prepare(study: str, stamp_text: str, made: Mapping[str, bool]) -> None:
         flush=True,
     )
     call("stimuli", "build", study, "--out", str(folder), "--quiet-when-current")
-    call("server", "study", "add", study, "--clips", str(folder), *[] if study in made else ["--open"])
+    call(
+        "server",
+        "study",
+        "add",
+        study,
+        "--clips",
+        str(folder),
+        *[] if study in made else ["--open", "--no-link"],
+    )
     stamp.write_text(stamp_text)
 
 
@@ -105,14 +113,17 @@ def main() -> None:
     build_docs_meanwhile()
     port = os.environ.get("PORT", "8000")
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
+    os.environ.setdefault(
+        "PALPEBRA_LOG_FORMAT", "text"
+    )  # for people, also where the output is not a terminal
     os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")  # links name it before the start
     call("server", "database", "upgrade")
     stamp_text, made = sources(), studies_made()
     if due := [study for study in STUDIES if not is_current(study, stamp_text, made)]:
         # The server starts afterwards: clips that are rendered while somebody rates would disturb playback.
         print(
-            f"[clips] to build: {', '.join(due)}. The first time takes a few minutes. The link to open is "
-            "printed at the end.",
+            f"[clips] to build: {', '.join(due)}. The first time takes a few minutes. The links are printed "
+            "once the server runs.",
             flush=True,
         )
     for study in STUDIES:

@@ -474,7 +474,7 @@ def blink_sheet(character: LevelSet, tall: bool) -> Rgb:
     Eyes one below the other, kinds side by side; whole faces in rows, the kinds one below the other.
     """
     kinds = []
-    for blur, title in ((False, "NB: one sample a frame"), (True, "MB: mean of ten samples, linear light")):
+    for blur, title in ((False, "NB: one sample per frame"), (True, "MB: mean of ten samples, linear light")):
         frames = blink_frames(character, blur)
         kinds.append(_titled(in_rows(frames, FACES_IN_A_ROW) if tall else np.vstack(frames), title))
     if tall:

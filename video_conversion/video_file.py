@@ -309,7 +309,7 @@ class _Frames:
             self.first = frame
         if frame.interlaced_frame:
             raise NotAClip(
-                "it is interlaced, two half pictures a frame; make it progressive with "
+                "it is interlaced (each frame holds two half pictures); make it progressive with "
                 "`ffmpeg -i FILE -vf bwdif OUT.mp4`"
             )
         if (frame.width, frame.height) != (self.first.width, self.first.height):

@@ -84,7 +84,7 @@ FormulaOption = Annotated[
         help=(
             "The model as R writes it, instead of the options for columns and slopes: "
             "'rating ~ a*b*age + (1 + a | person) + (1 | clip)'. Columns of numbers are covariates; "
-            "factor(x) makes one a factor."
+            "factor(x) treats x as a factor."
         )
     ),
 ]
@@ -422,7 +422,7 @@ def _read_model(
     decisions = [*data.decisions, *ordered]
     if formula is not None and (numbers := [name for name in model.covariates if ":" not in name]):
         decisions.append(
-            f"columns of numbers are covariates: {', '.join(numbers)}; factor(x) makes one a factor"
+            f"columns of numbers are covariates: {', '.join(numbers)}; factor(x) treats x as a factor"
         )
     return model, replace(data, rows=rows, decisions=tuple(decisions))
 

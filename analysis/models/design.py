@@ -318,7 +318,7 @@ class ModelData:
         return ["intercept", *sloped] if sloped else []
 
     def _further_term(self, group: Grouping, slopes: RandomSlopes) -> Term:
-        """Independent slopes, one variance an effect, as participants have them; or an intercept."""
+        """Independent slopes, one variance per effect, as participants have them; or an intercept."""
         effects = self.group_effects(group, slopes)
         if effects == ["intercept"]:
             return intercept_term(group.codes, len(group.names))

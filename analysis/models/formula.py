@@ -192,7 +192,7 @@ def _refuse_slopes_of_factors(formula: Formula, people: RandomPart, factors: Col
             if not set(factors).isdisjoint(effect):
                 name = ":".join(effect)
                 raise InputError(
-                    f"(0 + {name} | {part.grouping}) gives each level of a factor a separate variance. "
+                    f"(0 + {name} | {part.grouping}) gives each factor level a separate variance. "
                     f"Write (0 + {name} || {part.grouping}) for one variance"
                 )
     if people.independent and any(len(e) > 1 or e[0] in factors for e in people.correlated):

@@ -8,7 +8,7 @@ from scipy import optimize, special
 
 from analysis.models.laplace import LaplaceLikelihood, OrdinalData, Parameters, Trials, by_sd
 
-# Adaptive Gauss-Hermite quadrature of the cumulative-logit model with one random intercept a participant.
+# Adaptive Gauss-Hermite quadrature of the cumulative-logit model with one random intercept per participant.
 
 Floats = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ _NOTES = ("footnotes", "endnotes")
 
 
 def word_text(document: Any) -> str:
-    """The text of a document of python-docx, one paragraph a line, notes last."""
+    """The text of a document of python-docx, one paragraph per line, notes last."""
     from docx.oxml import parse_xml
 
     roots = [document.element.body]
@@ -103,7 +103,7 @@ _BROKEN = re.compile(
 
 
 def read_document(path: Path) -> str:
-    """The text of a file by its suffix, one paragraph, list item or table cell a line.
+    """The text of a file by its suffix, one paragraph, list item or table cell per line.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ class _Text(HTMLParser):
 
 
 def html_text(html: str) -> str:
-    """What a reader of an HTML page sees, a line a block."""
+    """What a reader of an HTML page sees, one line per block."""
     parser = _Text()
     parser.feed(html)
     parser.close()

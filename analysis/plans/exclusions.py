@@ -58,11 +58,11 @@ class RuleVerdicts:
         Participant of every run.
     by_hand : tuple of (str, str)
         Runs excluded by hand, and why; whatever the choice, they are left out.
-    runs : tuple of tuple of (str, str), one a rule
+    runs : tuple of tuple of (str, str), one per rule
         Runs that the rule leaves out, and why; empty for a rule about trials.
-    trials : tuple of (n,) bool arrays, one a rule
+    trials : tuple of (n,) bool arrays, one per rule
         Rated main trials that the rule leaves out; None for a rule about runs.
-    lacking : tuple of str, one a rule
+    lacking : tuple of str, one per rule
         Why the rule cannot be applied; empty where it can.
     main : DataFrame
         The n rated main trials.
@@ -79,7 +79,7 @@ class RuleVerdicts:
     main: pd.DataFrame = field(repr=False)
 
     def under(self, chosen: Sequence[bool]) -> Exclusions:
-        """Apply the chosen rules, one truth value a declared rule."""
+        """Apply the chosen rules, one truth value per declared rule."""
         at = [rule for rule, applies in enumerate(chosen) if applies]
         reasons: dict[str, list[str]] = {}
         # A run may break several rules; all reasons are named.

@@ -38,7 +38,7 @@ class FactorialDesign:
 
     Notes
     -----
-    With k cells a participant an effect within has :math:`\lambda = N k f^2 / (1 - \rho)`, one between
+    With k cells per participant, a within effect has :math:`\lambda = N k f^2 / (1 - \rho)`, one between
     :math:`\lambda = N k f^2 / (1 + (k - 1) \rho)`, of the noncentral F (Cohen 1988). A covariate
     that correlates by r with participants' means divides the latter by :math:`1 - r^2` and takes
     one error df.

@@ -102,7 +102,7 @@ class AnswersQuery:
         return {str(run): str(moment) for rows in portions for run, moment in rows}
 
     def _portions(self, selection: str) -> Iterator[Sequence[Any]]:
-        # the driver's own cursor: SQLAlchemy's row objects cost a second a million rows
+        # the driver's own cursor: SQLAlchemy's row objects cost one second per million rows
         query = text(f"SELECT {selection}").bindparams(**self._values)
         # The driver's cursor does not know these parameters: the dialect writes their values into the text.
         sql = query.compile(self._engine, compile_kwargs={"literal_binds": True})

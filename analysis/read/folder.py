@@ -1,4 +1,4 @@
-"""Folders of tables as one table: a file a person, as programs for experiments save them, or Psych-DS.
+"""Folders of tables as one table: one file per person, as programs for experiments save them, or Psych-DS.
 
 Source: Psych-DS 1.0, https://psych-ds.github.io (data files are `data/**/keyword-value_..._data.csv`, and the
 keywords of a file's name are columns). Of any other folder the files `*.csv` in it are read, and the name of

@@ -36,7 +36,7 @@ class StudyAnswers:
 
 
 def load_csv(path: Path, experiment: Experiment, reading: Reading, study: str | None = None) -> StudyAnswers:
-    """Read a CSV export, or any table with `participant`, the columns of `reading` and one a factor.
+    """Read a CSV export, or any table with `participant`, the columns of `reading` and one per factor.
 
     Raises
     ------

@@ -390,7 +390,7 @@ def draw_choices(pairs: Sequence[PairCount], synthetic: bool, people: int) -> Pi
         )
 
 
-# Figures of continuous ratings: a panel per cell with its blinks marked, and the correlation by lag.
+# Figures of continuous ratings: one panel per cell with its blinks marked, and the correlation by lag.
 
 TRACE_COLUMNS = 2
 PANEL_INCHES = 1.9
@@ -401,7 +401,7 @@ MARKS_SHARE = 0.12
 def traces_figure(
     traces: Sequence[MeanTrace], labels: Sequence[str], earlier_s: float, synthetic: bool
 ) -> Picture:
-    """A panel a cell: mean and interval, drawn `earlier_s` earlier than given; a row of marks a clip."""
+    """One panel per cell: mean and interval, drawn `earlier_s` earlier; one row of marks per clip."""
     columns = min(TRACE_COLUMNS, len(traces))
     rows = -(-len(traces) // columns)
     figure = new_figure(height=PANEL_INCHES * rows + 0.9)

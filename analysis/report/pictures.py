@@ -279,7 +279,7 @@ FORMATS = (".png", ".svg", ".pdf")
 
 
 def draw_power(result: "PowerResult", target: float = 0.8) -> Figure:
-    """Power against n, a line an effect, with two standard errors of the simulation either side."""
+    """Power against n, one line per effect, with two standard errors of the simulation either side."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 4.2), layout="constrained")
         FigureCanvasAgg(figure)

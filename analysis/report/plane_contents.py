@@ -67,7 +67,7 @@ def contents_of(
                 (*sentences(fits, variables), *map(difference_sentence, differences)),
                 # A function, so that a report without figures never loads matplotlib.
                 draw=lambda: (draw(fits, variables, prepared.synthetic, people),),
-                # Two numbers a series: a brief report can have them all.
+                # Two numbers per series: a brief report can have them all.
                 brief=(*sentences(fits, variables), *map(difference_sentence, differences)),
             ),
         ),
@@ -94,7 +94,7 @@ def _variables(prepared: PlanRows) -> tuple[str, str]:
 
 
 def merge(fits: "Sequence[SeriesPlane]") -> PlanesResult | None:
-    """The fits of all series as one result, a condition a series; None where none was fitted."""
+    """The fits of all series as one result, one condition per series; None where none was fitted."""
     done = [(fit.label, fit.result) for fit in fits if fit.result is not None]
     if not done:
         return None
@@ -178,7 +178,7 @@ def numbers(
 
 
 def draw(fits: "Sequence[SeriesPlane]", variables: tuple[str, str], synthetic: bool, people: int) -> Picture:
-    """A panel a series: shares at every stimulus, and the line of thresholds with its interval."""
+    """One panel per series: shares at every stimulus, and the line of thresholds with its interval."""
     # matplotlib takes a second to import, which commands that draw nothing need not pay
     import matplotlib as mpl
 

@@ -113,7 +113,7 @@ def _r_files(
 
 
 def merge(fits: "Sequence[SeriesFit]") -> ThresholdsResult:
-    """The fits of all series as one result, a condition a series."""
+    """The fits of all series as one result, one condition per series."""
     done = [(fit.label, fit.result) for fit in fits if fit.result is not None]
     return ThresholdsResult(
         # "all" is the only condition of a series that is fitted by itself.

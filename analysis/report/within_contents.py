@@ -16,11 +16,11 @@ from analysis.within.simple_effects import SIGNIFICANCE, first_p
 from analysis.within.strata import UnivariateTest
 from table_files import counted
 
-# Sentences in APA style, one an effect.
+# Sentences in APA style, one per effect.
 
 
 def sentences(analysis: Analysis) -> tuple[str, ...]:
-    """One sentence an effect: direction of two-level factors, test, effect size with its interval."""
+    """One sentence per effect: direction of two-level factors, test, effect size with its interval."""
     multivariate = uses_multivariate(analysis)
     return tuple(_sentence(analysis, effect, multivariate) for effect in analysis.anova.effects)
 

@@ -170,7 +170,7 @@ def effect_size_table(analysis: Analysis) -> Table:
 
 
 def _reasons(analysis: Analysis, which: str, skip: str = "\0") -> tuple[str, ...]:
-    """Why tests do not exist, one note a reason."""
+    """Why tests do not exist, one note per reason."""
     effects: dict[str, list[str]] = {}
     for effect in analysis.anova.effects:
         reason = getattr(effect, which)
@@ -179,7 +179,7 @@ def _reasons(analysis: Analysis, which: str, skip: str = "\0") -> tuple[str, ...
     return tuple(f"Not defined for {', '.join(names)}: {reason}." for reason, names in effects.items())
 
 
-# Tables of the margins: means, pairs, simple effects, contrasts, equivalence, and ratings a cell.
+# Tables of the margins: means, pairs, simple effects, contrasts, equivalence, and ratings per cell.
 
 
 def means_table(analysis: Analysis) -> Table:

@@ -62,7 +62,7 @@ class Totals(NamedTuple):
 def rating_rows(
     experiment: Experiment, space: DesignSpace, totals: Sequence[Totals], rng: np.random.Generator
 ) -> Iterator[Row]:
-    """Yield one mapping a trial and scale with the columns of the CSV export, every one marked synthetic.
+    """Yield one mapping per trial and scale with the columns of the CSV export, every one marked synthetic.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Answers of a table: a stimulus and a yes or no a trial, of whom and in which condition."""
+"""Answers of a table: per trial a stimulus and yes or no, with participant and condition."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

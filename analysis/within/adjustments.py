@@ -6,7 +6,7 @@ call (0.2 s and more).
 The upper tail of the studentized range has a small relative error however small it is. R's `ptukey` is off
 by 2e-7 where p is near 0.05 and by a third where few degrees of freedom meet a large range (3 df, q = 35:
 9.2e-5 for 1.403e-4, which for two means is the t test's p); scipy's `studentized_range` is right to about
-1e-11 absolutely and takes a hundredth of a second a value.
+1e-11 absolutely and takes 0.01 s per value.
 """
 
 from functools import cache

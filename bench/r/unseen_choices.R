@@ -16,7 +16,7 @@ bt <- function(name, d, order=FALSE, link="logit") { # columns left right winner
   writeLines(toJSON(out, digits=I(17)), file.path(folder, paste0(name, if(order)".o", if(link!="logit")".t", ".json")))
 }
 david <- function(name, d) { write1(name, d); it <- sort(unique(c(d$left,d$right)), method="radix")
-  # loglinear: three rows a comparison, multinomial by glm poisson with an effect for each pair
+  # loglinear: three rows per comparison, multinomial by glm poisson with an effect for each pair
   a <- pmin(match(d$left,it), match(d$right,it)); b <- pmax(match(d$left,it), match(d$right,it)); w <- match(ifelse(d$winner=="left",d$left,ifelse(d$winner=="right",d$right,NA)), it)
   key <- paste(a,b); u <- unique(key); rows <- do.call(rbind, lapply(u, function(k) { s <- key==k; x <- a[s][1]; y <- b[s][1]; data.frame(pair=k, n=c(sum(w[s]==x,na.rm=TRUE), sum(w[s]==y,na.rm=TRUE), sum(is.na(w[s]))), x=c(x,y,NA), p=x, q=y) }))
   X <- sapply(seq_along(it)[-1], function(k) ifelse(is.na(rows$x), ((rows$p==k)+(rows$q==k))/2, rows$x==k)); tie <- as.integer(is.na(rows$x)); colnames(X) <- it[-1]

@@ -1,4 +1,4 @@
-"""Every clip for everyone, one a trial: in blocks, with practice before and attention checks between."""
+"""Every clip for everyone, one per trial: in blocks, with practice before and attention checks between."""
 
 import random
 from collections.abc import Callable, Sequence

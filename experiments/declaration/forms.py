@@ -70,7 +70,7 @@ class Question(Declaration):
 
     @abstractmethod
     def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
-        """The columns of its answers: one, for None, or one an option where several may be chosen.
+        """The columns of its answers: one, for None, or one per option where several may be chosen.
 
         Parameters
         ----------

@@ -117,7 +117,7 @@ _MAX_KEYS = 10_000
 
 
 class RateLimit:
-    """At most `per_minute` events a key, refilled steadily (a token bucket).
+    """At most `per_minute` events per key, refilled steadily (a token bucket).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Logs without personal data: one JSON object a line, or plain lines for a terminal.
+"""Logs without personal data: one JSON object per line, or plain lines for a terminal.
 
 No internet address, no token, no answer is ever written. An exception is reported by its type and the places
 it passed; its own words are kept only where they cannot quote what a person sent.

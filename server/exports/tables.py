@@ -189,7 +189,7 @@ def _json(value: Any) -> str:
 
 
 def raw_lines(session: Session, study: Study, extract: Extract) -> Iterator[str]:
-    """One JSON object a run with every play, drawn frame, event, form and calibration."""
+    """One JSON object per run with every play, drawn frame, event, form and calibration."""
     for public_id in repository.public_ids(session, study, extract):
         yield runs.timeline(session, study, public_id).model_dump_json() + "\n"
 

@@ -1,4 +1,4 @@
-"""All tables, one module a subject; import them from here."""
+"""All tables, one module per subject; import them from here."""
 
 from server.core.values import ROLES, Role
 from server.models.accounts import (

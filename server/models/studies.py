@@ -441,7 +441,7 @@ class RunTally(Base):
     Attributes
     ----------
     heat : str
-        A letter a trial.
+        One letter per trial.
     not_good : int
         Plays that were flagged or failed.
     counts : str

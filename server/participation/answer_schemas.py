@@ -267,7 +267,7 @@ class ViewIn(BaseModel):
     trial_index: Count
     number: Annotated[int, Field(ge=1, le=1000)] = Field(description="Of the trial's views, from 1.")
     play: Annotated[int, Field(ge=1, le=100)] | None = Field(
-        default=None, description="The play that it is part of; an older page has one view a play."
+        default=None, description="The play that it is part of; an older page has one view per play."
     )
     # Required, but may be null: a page must say that its clock cannot be right.
     started_at_client: Moment | None = Field(description="Null where the device's clock cannot be right.")

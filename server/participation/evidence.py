@@ -34,7 +34,7 @@ def _without_time(value: Any) -> Any:
     return {name: {**one, "rt": None} if isinstance(one, dict) else one for name, one in value.items()}
 
 
-# What a run's answers say about how they were given: one number a signal, None where it cannot be had.
+# What a run's answers say about how they were given: one number per signal, None where it cannot be had.
 
 # Patterns that fingers make are short; each further distance would be one more chance to fit by accident.
 LONGEST_CYCLE = 4

@@ -178,7 +178,7 @@ class Tally:
     Attributes
     ----------
     heat : str
-        A letter a trial, as far as trials were shown.
+        One letter per trial, as far as trials were shown.
     not_good : int
         Plays flagged or failed, of any trial.
     plays : dict of PlayKey to int

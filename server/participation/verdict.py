@@ -24,7 +24,7 @@ SHOWN_SHARE = 0.9
 """Share of a frame's slack that the clock may be uneven by, by `make scope` (decision 0802), and of the time
 for which a frame stays: one that came later was not seen, whatever was declared."""
 ROUNDING = 0.05
-"""60 fps on a screen of 59.9 Hz counts as one refresh a frame."""
+"""60 fps on a screen of 59.9 Hz counts as one refresh per frame."""
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ from server.participation.view_repository import RunOfViews, StoredView, TrialCl
 # for backups and either database.
 
 PER_MS = 100
-"""Steps of time a millisecond."""
+"""Steps of time per millisecond."""
 Entry = tuple[int, float]
 
 
@@ -66,7 +66,7 @@ def unpack_log(text: str) -> list[Entry]:
 
 
 def _add(out: bytearray, number: int) -> None:
-    """Append a number: its sign in the lowest bit, then seven bits a byte with a bit for `more`."""
+    """Append a number: its sign in the lowest bit, then seven bits per byte with a bit for `more`."""
     rest = 2 * number if number >= 0 else -2 * number - 1
     while rest > 0x7F:
         out.append(rest & 0x7F | 0x80)

@@ -106,7 +106,7 @@ def latest_runs(session: Session, study: Study, origin: str, limit: int) -> Sequ
 
 
 class MetRun(NamedTuple):
-    """A run and how far its trials went: a letter a trial."""
+    """A run and how far its trials went: one letter per trial."""
 
     id: int
     participant: str

@@ -259,7 +259,7 @@ class MonitoredRun(BaseModel):
     evidence_verdict: Verdict | None = Field(
         description="Whether the answers are likely a person's; null while the run goes on."
     )
-    heat: str = Field(description="One letter a trial: . open, g good, u uncertain, f flagged, x failed.")
+    heat: str = Field(description="One letter per trial: . open, g good, u uncertain, f flagged, x failed.")
 
 
 class FunnelStep(BaseModel):
@@ -562,7 +562,7 @@ class ReplayedTrial(BaseModel):
 
 
 class ClipInRole(BaseModel):
-    """Which clip a trial was assigned in which role."""
+    """A clip that a trial was assigned, and its role."""
 
     role: Role
     cell: str

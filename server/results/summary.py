@@ -168,7 +168,7 @@ class CellTrace:
     Attributes
     ----------
     times_s, mean, low, high : list of float
-        A value a point; at most `MAX_POINTS`, evenly spaced.
+        One value per point; at most `MAX_POINTS`, evenly spaced.
     level : float
         Mean over the whole trace.
     left_out : int

@@ -77,6 +77,7 @@ def add(
     ],
     name: Annotated[str, typer.Option(help="Name on this server. Default: the experiment's name.")] = "",
     open_: Annotated[bool, typer.Option("--open", help="Set it live and print its general link.")] = False,
+    link: Annotated[bool, typer.Option(help="Print the link of a study that is set live.")] = True,
 ) -> None:
     """Add an experiment and its clips to the server, completely or not at all.
 
@@ -107,7 +108,7 @@ def add(
                 out.print(f"note: {note}", markup=False)
             if open_:
                 _set_status(session, study, "live", of_clips)
-                for group, url in _urls(services.settings, session, study):
+                for group, url in _urls(services.settings, session, study) if link else ():
                     to = f" of the group {group}" if group else ""
                     out.print(f"link for participants{to}, once the server runs: {url}", soft_wrap=True)
 

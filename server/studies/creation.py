@@ -268,7 +268,7 @@ def add_version(
 
 
 def _add_clips(session: Session, version: StudyVersion, manifest: Manifest) -> None:
-    """Store the rows of a version's clips by one statement a table: objects of 5,000 clips take seconds."""
+    """Store the rows of a version's clips by one statement per table: objects of 5,000 clips take seconds."""
     stored = {video.sha256: video for video in (*manifest.files, *manifest.sources)}
     known = repository.known_clips(session, stored)
     repository.insert_clips(

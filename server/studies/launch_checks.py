@@ -368,7 +368,8 @@ def _tried(launch: LaunchState) -> Iterator[LaunchCheck]:
     if not launch.is_tried:
         text = (
             f"Nobody has completed version {launch.version.number} yet, not even as a preview. "
-            "Complete it once as a participant; preview answers do not count."
+            "Complete it once as a participant. Preview answers are not part of the results and "
+            "are deleted later."
         )
         yield LaunchCheck(kind="not_tried", blocks=False, text=text, page="preview")
 

@@ -79,7 +79,7 @@ STRIPS_FILE = "strips.json"
 
 
 class Strips(BaseModel):
-    """Picture strips, one a character: frames of one size, one below the other."""
+    """Picture strips, one per character: frames of one size, one below the other."""
 
     width_px: int = Field(gt=0)
     height_px: int = Field(gt=0)

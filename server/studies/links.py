@@ -160,7 +160,7 @@ def links_with_runs(
 
 
 def general_links(session: Session, key: bytes, study: Study) -> list[Link]:
-    """The study's first general link, one a group where links decide groups; made where there is none."""
+    """The study's first general link, one per group where links decide groups; made where there is none."""
     experiment = active_definition(session, study)
     groups = names(experiment) if experiment.groups.by == "link" else [""]
     return [_general_link(session, key, study, group) for group in groups]

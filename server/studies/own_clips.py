@@ -154,7 +154,7 @@ def largest_of(placed: Placed, folder: Path) -> tuple[int, int]:
 
 
 def definition_text(name: str, placed: Placed, asked: OwnClips, largest: tuple[int, int] = (0, 0)) -> str:
-    """A definition as TOML, to be edited further: one factor a column, random order, the template's trial.
+    """A definition as TOML, to be edited further: one factor per column, random order, the template's trial.
 
     Its smallest window holds the largest clip, `largest` pixels wide and high: in a smaller one the clip
     would be cut off at the sides, though every frame is shown.

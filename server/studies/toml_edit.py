@@ -115,7 +115,7 @@ def _text(value: str) -> Item:
 
 
 def spread_elements(array: Array) -> None:
-    """Give each element a line, where it is a table or the array is long."""
+    """Give each element its own line, where it is a table or the array is long."""
     array.multiline(any(isinstance(item, Mapping) for item in array) or len(array.as_string()) > MAX_INLINE)
 
 

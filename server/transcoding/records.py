@@ -1,4 +1,4 @@
-"""What has been done with the videos of an upload: a line a file, written by the worker."""
+"""What has been done with the videos of an upload: one line per file, written by the worker."""
 
 from collections.abc import Iterable
 from pathlib import Path

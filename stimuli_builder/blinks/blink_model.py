@@ -406,7 +406,7 @@ def textbook_profile(
     Parameters
     ----------
     kind : {"SL", "AL", "SL_ease", "AL_ease"}
-        S: both phases of one length; A: phases in the recorded ratio. Ease: a cubic Bezier a phase.
+        S: both phases of one length; A: phases in the recorded ratio. Ease: a cubic Bezier per phase.
     duration_frames : float
         Onset to end, in frames at 30 fps.
     start_level, end_level : float

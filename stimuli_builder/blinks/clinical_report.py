@@ -27,7 +27,7 @@ NEARLY_CLOSED = 0.8
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a table: what it is, and a value an eye."""
+    """One line of a table: what it is, and one value per eye."""
 
     name: str
     values: tuple[str, ...]
@@ -76,7 +76,7 @@ def _rejected(frame: pd.DataFrame) -> set[tuple[str, int]]:
 
 
 def blink_rows(eyes: Sequence[EyeBlinks], accepted: pd.DataFrame, scale: Scale | None) -> list[Row]:
-    """Lines of the table of blinks, a value an eye; medians with the quartiles."""
+    """Lines of the table of blinks, one value per eye; medians with the quartiles."""
     parts = [accepted[accepted["column"] == eye.series.column] for eye in eyes]
     rates = tuple(f"{len(part) / eye.seconds * 60:.1f}" for part, eye in zip(parts, eyes, strict=True))
     # From minimum to minimum, in the order of time.

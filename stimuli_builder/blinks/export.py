@@ -426,7 +426,7 @@ def time_unit(fps: float) -> str:
 def to_maya(
     curve: AnimationCurve, node: str = "face", left: str = "eyeBlinkLeft", right: str = "eyeBlinkRight"
 ) -> str:
-    """One unitless curve an eye on `node`, a key a frame, linear between them."""
+    """One unitless curve per eye on `node`, one key per frame, linear between them."""
     header = [
         "animVersion 1.1;",
         "mayaVersion 2024;",

@@ -89,7 +89,7 @@ PRESETS = MappingProxyType(
 
 
 def preset(name: str) -> LabelOptions:
-    """Return the named set of values: "velocity", "relative" or "paper" (0.1 px a frame)."""
+    """Return the named set of values: "velocity", "relative" or "paper" (0.1 px per frame)."""
     if name not in PRESETS:
         raise InputError(f"unknown preset '{name}'{did_you_mean(name, [*PRESETS, 'classifier'])}")
     return PRESETS[name]

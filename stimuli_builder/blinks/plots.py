@@ -56,7 +56,7 @@ def check_figure_name(path: Path) -> None:
 def series_figure(eyes: Sequence[EyeBlinks], rejected: set[tuple[str, int]]) -> "Figure":
     """Figure 3: the distance over time, every labeled blink marked from onset to end.
 
-    Ten seconds a row for the first two minutes; a longer recording is drawn in twelve longer rows.
+    Ten seconds per row for the first two minutes; a longer recording is drawn in twelve longer rows.
     """
     duration_s = max(eye.smooth.size / eye.series.fps for eye in eyes)
     row_s = max(SECONDS_A_ROW, duration_s / MAX_ROWS)

@@ -68,7 +68,7 @@ def placed_mask(shown: Mask, rng: Generator) -> Mask:
 # Random dots of which no picture, and not their mean, says anything: only their motion does.
 #
 # Each picture is a lattice of independent dots, each dark or bright with probability 1/2. Within a segment
-# of `SEGMENT` steps the dots inside the mask move one way and those outside the other, one dot a step, over
+# of `SEGMENT` steps the dots inside the mask move one way and those outside the other, one dot per step, over
 # two textures that are independent of each other; a share 1 - coherence of the dots is drawn again in each
 # picture.
 #
@@ -197,7 +197,7 @@ def _turned(curve: ClipCurve, *, turned: bool) -> ClipCurve:
 CHECK_VERSION = 1
 """Raise this when the same inputs come to give other pictures; every check's clip is then made again."""
 DOTS_QP, OWN_LOOK_QP = 16, 24
-"""Quantisers: dots are coded nearly as drawn; so coded, a face would take 5 MB a clip."""
+"""Quantisers: dots are coded nearly as drawn; so coded, a face would take 5 MB per clip."""
 DOT_PX = 4
 """Side of a dot: that of the smallest block that H.264 transforms."""
 SIDE_PX = LATTICE * DOT_PX

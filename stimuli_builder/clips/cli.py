@@ -200,7 +200,7 @@ def _print_leaks(leaks: "Sequence[LevelLeak]") -> None:
 
 @contextmanager
 def progress_bar(what: str) -> "Iterator[Progress]":
-    """Show clips done and time left on stderr; a line per tenth of them if stderr is not a terminal."""
+    """Show clips done and time left on stderr; one line per tenth of them if stderr is not a terminal."""
     if not sys.stderr.isatty():
         yield partial(_print_tenth, what)
         return
@@ -411,7 +411,7 @@ Examples:
 def strips_command(
     out: Annotated[Path, typer.Option(help="Folder for the pictures and strips.json; created if missing.")],
 ) -> None:
-    """Write one WebP a character, and strips.json."""
+    """Write one WebP per character, and strips.json."""
     from stimuli_builder.clips.preview import write_strips
 
     for name, size in write_strips(out):

@@ -124,9 +124,11 @@ def clip_command(
         sys.stderr.write(f"note: {note}\n")
     clip = SingleClip(settings, profile, exemplar, seed, clip_frames, barcode)
     made = render_single(clip, out)
+    # Only a recorded blink has a name that says more than the option; others would be their parameters.
+    name = made.curve.profile_id if profile == "real" else profile
     print(
-        f"wrote {out}: {made.frames} frames at {fps} fps, profile {made.curve.profile_id}, "
-        f"{made.curve.duration_frames:g} frames at 30 fps from frame {made.onset_frame}"
+        f"wrote {out}: {made.frames} frames at {fps} fps; profile {name}; the blink begins at frame "
+        f"{made.onset_frame} and lasts {made.curve.duration_frames / 0.03:.0f} ms"
     )
 
 

@@ -39,7 +39,7 @@ def read_closure_file(path: Path) -> list[BlinkProfile]:
 
     A file with a column `profile_id` is a table of profiles as `stimuli blinks` writes it. Any other
     holds one blink: a column `closure` (0 open, 1 closed) at 300 fps, and where wanted `closure_other`
-    (right eye), `lower_up_mm` and `lower_nasal_mm`; or numbers alone, one a line. Semicolons, tabs and
+    (right eye), `lower_up_mm` and `lower_nasal_mm`; or numbers alone, one per line. Semicolons, tabs and
     decimal commas are read as in a series (`stimuli_builder.blinks.csv_table`).
 
     Raises

@@ -209,7 +209,7 @@ def repetition_notes(planned: list[PlannedClip]) -> tuple[str, ...]:
 
 
 def manifest_text(manifest: Manifest) -> str:
-    """JSON with one line a clip; equal manifests give equal text."""
+    """JSON with one line per clip; equal manifests give equal text."""
     content = manifest.model_dump(mode="json")
     listed = {name: content.pop(name) for name in ("clips", "checks")}
     # A study without checks keeps the manifest that it had before checks existed.

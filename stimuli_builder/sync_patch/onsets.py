@@ -212,7 +212,7 @@ def changes(trace: Trace, fps: float) -> Changes:
     Parameters
     ----------
     trace : Trace
-        At least some samples a frame.
+        At least some samples per frame.
     fps : float
         The clip's frame rate.
 
@@ -259,7 +259,7 @@ NAMED_MAX = 12
 
 
 def of_film(plays: Sequence[PlayOnScreen], pictures_per_s: float) -> list[str]:
-    """A line a play, and one over all."""
+    """One line per play, and one over all."""
     lines = [
         f"{len(plays)} presentation(s) of {plays[0].frames} frames at {plays[0].fps:g} fps; onsets accurate "
         f"to {500 / pictures_per_s:.1f} ms ({pictures_per_s:.0f} frames per second)"
@@ -289,7 +289,7 @@ def _play(play: PlayOnScreen) -> str:
 
 
 def of_trace(changes: Changes) -> list[str]:
-    """A line a play: a photodiode sees changes and no numbers."""
+    """One line per play: a photodiode sees changes and no numbers."""
     lines = []
     for number, steps in enumerate(changes.intervals_ms(), start=1):
         long = [step for step in steps if step > LONG_SHARE * changes.period_ms]

@@ -302,7 +302,7 @@ def _rounded(frames: dict[int, Points]) -> dict[str, Any]:
     return {str(number): np.round(points, 3).tolist() for number, points in frames.items()}
 
 
-# Which frames of a label file a person has changed or accepted, and which are as a program proposed them.
+# Which frames of a label file somebody has changed or accepted, and which are as a program proposed them.
 
 DETECTED = "detector on single frames, not reviewed"
 TRACKED = "proposed by the tracker for correction by hand"

@@ -57,7 +57,7 @@ class CoupledModel:
     point_errors : float64 array (9 * eyes,)
         Root mean square distance in px of the video of each point on those frames.
     error_slope : float64 array (1,)
-        By which power of its residual over the usual one a frame's error grows.
+        By which power of its residual over the usual one the error of a frame grows.
     variance_kept : (float, float, float)
         Share of the variance in shape, appearance and coupled parameters.
     """

@@ -1,4 +1,4 @@
-"""Compiled loops that place the mesh in a picture and sample it there: float32, four pixels a look-up."""
+"""Compiled loops that place the mesh in a picture and sample it there: float32, four pixels per look-up."""
 
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
@@ -53,7 +53,7 @@ def outside(needed, box):
 
 @compiled
 def pack_pixels(picture, box):
-    """Four pixels of every cell of a box in one number, int32: one look-up a sample instead of four."""
+    """Four pixels of every cell of a box in one number, int32: one look-up per sample instead of four."""
     cells = np.empty((box[1] - box[0], box[3] - box[2]), np.int32)
     for row in range(cells.shape[0]):
         above = picture[box[0] + row, box[2] : box[3] + 1]

@@ -99,7 +99,7 @@ def inter_eyelid_distances(points: Points, markers: LidMarkers) -> NDArray[np.fl
 
 
 def with_border(points: Points) -> Points:
-    """Extend the template by 12 border vertices an eye: 18 points become 42 (paper, Figure 5b).
+    """Extend the template by 12 border vertices per eye: 18 points become 42 (paper, Figure 5b).
 
     The border is fixed to the canthi alone, so that it stays with the face while the lids move.
     """

@@ -16,7 +16,7 @@ Row = dict[str, object]
 def compare(
     experiment: Experiment, abilities: Mapping[str, float], participants: int, nu: float = 0.0, seed: int = 1
 ) -> list[Row]:
-    """One export row a comparison, answered by Davidson's model (Bradley-Terry where `nu` is 0)."""
+    """One export row per comparison, answered by Davidson's model (Bradley-Terry where `nu` is 0)."""
     rng, rows = random.Random(seed), []
     for person in range(participants):
         trials = KINDS[experiment.trial.kind].assign(experiment, person, person)

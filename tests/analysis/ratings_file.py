@@ -27,7 +27,7 @@ def simulate(experiment: Experiment, participants: int, trials: int = 4, seed: i
 
 
 def rows_of(experiment: Experiment, ratings: np.ndarray) -> list[Row]:
-    """One export row a rating."""
+    """One export row per rating."""
     names = experiment.analysis.factors or experiment.factor_names
     cells = list(product(*([level.name for level in experiment.factor(name).levels] for name in names)))
     rows = []

@@ -129,7 +129,7 @@ class Visit:
 
 
 CARD_PX = 324
-"""The card's long side on a screen of 96 pixels an inch."""
+"""The card's long side on a screen of 96 pixels per inch."""
 
 
 def fit_card(page: Page, *widths: int) -> None:

@@ -17,8 +17,10 @@ from tools import first_run
 def added(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
     """The studies that `make run` adds, with clips of the three in the data folder, stamped and current."""
     monkeypatch.delenv("DATABASE_URL", raising=False)
-    for name in ("PALPEBRA_DATA_FOLDER", "PALPEBRA_PUBLIC_URL"):  # restored afterwards: `main` sets them
-        monkeypatch.setenv(name, str(tmp_path) if "DATA" in name else "http://localhost:8000")
+    # Restored afterwards: `main` sets them.
+    monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path))
+    monkeypatch.setenv("PALPEBRA_PUBLIC_URL", "http://localhost:8000")
+    monkeypatch.setenv("PALPEBRA_LOG_FORMAT", "text")
     monkeypatch.setattr(first_run, "DATA", tmp_path)
     for folder in (*first_run.STUDIES, "strips"):
         (tmp_path / "stimuli" / folder).mkdir(parents=True)
@@ -55,7 +57,7 @@ def test_the_wait_is_announced_with_what_is_built(
 ) -> None:
     first_run.main()
     said = capsys.readouterr().out
-    assert "[clips] to build: exp3, exp1, exp2. The first time takes a few minutes. The link to open" in said
+    assert "[clips] to build: exp3, exp1, exp2. The first time takes a few minutes. The links are" in said
     assert "[clips] exp1 (2 of 3): rendering what is missing" in said
     first_run.main()
     assert "[clips]" not in capsys.readouterr().out

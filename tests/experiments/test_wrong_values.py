@@ -53,7 +53,7 @@ def fits(before: Any, value: Any) -> bool:
 @pytest.mark.parametrize("file", [*FILES, *(f"experiments/{name}.toml" for name in DEMOS)])
 def test_each_key_refuses_other_types_with_its_line_and_what_came(file: str) -> None:
     data = tomllib.loads((REPOSITORY / file).read_text(encoding="utf-8"))
-    # One wrong value a place, in turn: over the places of a file each comes many times.
+    # One wrong value per place, in turn: over the places of a file each comes many times.
     for number, path in enumerate(places(data)):
         wrong = [value for value in WRONG if not fits(replaced(data, path, value)[0], value)]
         value = wrong[number % len(wrong)]

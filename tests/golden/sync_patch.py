@@ -13,7 +13,7 @@ FILE = Path(__file__).with_name("sync_patch.json")
 
 
 def drawn() -> dict[str, str]:
-    """Nine characters a frame, row by row: 1 for white."""
+    """Nine characters per frame, row by row: 1 for white."""
     return {str(number): "".join(str(int(white)) for white in fields_of_number(number)) for number in FRAMES}
 
 

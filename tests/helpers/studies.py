@@ -253,7 +253,7 @@ def client(services: Services) -> Iterator[TestClient]:
 
 @pytest.fixture
 def study(services: Services, quick_folder: Path) -> StudyInDatabase:
-    """The short study, live: 2 practice trials, 8 clips in 2 blocks, one attention check a block."""
+    """The short study, live: 2 practice trials, 8 clips in 2 blocks, one attention check per block."""
     return add_study(services, quick_folder / "clips")
 
 

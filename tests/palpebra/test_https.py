@@ -124,7 +124,7 @@ def test_certificate_is_fetched_and_pages_are_served(
             assert page(f"https://{domain}/admin/", trusted) == 200
             assert page(f"https://{domain}/readyz", trusted) == 404  # not for the world
             until(lambda: "Caddy got the certificate." in log.read_text())
-            assert f"Open https://{domain}/admin/start#" in log.read_text()
+            until(lambda: f"Open https://{domain}/admin/start#" in log.read_text())
         finally:
             getattr(process, ending)()
     assert (tmp_path / "data" / "address").read_text() == f"https://{domain}\n"

@@ -184,9 +184,15 @@ def test_server_starts_without_extras_and_without_what_only_unix_has(tmp_path: P
     with subprocess.Popen(
         command, env={**os.environ, "HOME": str(tmp_path)}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
     ) as process:
+        assert process.stdout
+        said = ""
         try:
-            until(lambda: answers(port, "/readyz") or process.poll() is not None)
-            assert answers(port, "/readyz"), process.stdout and process.stdout.read().decode()
+            for line in process.stdout:
+                said += line.decode()
+                if line.startswith(b"Open "):
+                    break
+            assert answers(port, "/healthz"), said  # people may follow the link at once
+            until(lambda: answers(port, "/readyz"))
             assert answers(port, "/admin/") or not Settings().frontend_folder.is_dir()
             link = palpebra(
                 "server", "admin", "link", folder=tmp_path, PALPEBRA_DATA_FOLDER=f"{tmp_path}/data"
@@ -194,7 +200,7 @@ def test_server_starts_without_extras_and_without_what_only_unix_has(tmp_path: P
             assert link.stdout.startswith(f"http://localhost:{port}/admin/invitation#")
         finally:
             process.terminate()
-        said = process.stdout.read().decode() if process.stdout else ""
+        said += process.stdout.read().decode()
         # On a line alone, set apart from the lines before and from the log.
         assert re.search(rf"\n\nOpen http://localhost:{port}/admin/start#\S+\n\nStop with Ctrl-C", said)
 

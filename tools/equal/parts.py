@@ -269,13 +269,13 @@ def unpack_archives(folder: Path) -> None:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """A value as JSON, a line per leaf."""
+    """A value as JSON, one line per leaf."""
     text = json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
     write_bytes(path, text.encode())
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """A file in a folder that is made; JSON gets a line per leaf, so that a difference is one line."""
+    """A file in a folder that is made; JSON gets one line per leaf, so that a difference is one line."""
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.suffix == ".json" and re.match(rb"\s*[\[{]", content):
         value = json.loads(content)

@@ -70,7 +70,7 @@ def golden_definitions() -> Path:
 
 
 def assignments(tree: Path, out: Path) -> None:
-    """What each of the first places of every example is shown, a line per trial."""
+    """What each of the first places of every example is shown, one line per trial."""
     for name, experiment in examples(tree):
         assign = locate("KINDS")[experiment.trial.kind].assign
         lines = []
@@ -100,7 +100,7 @@ def plain(value: Any) -> Any:
 
 
 def write_json(path: Path, value: Any) -> None:
-    """A value as JSON, a line per leaf."""
+    """A value as JSON, one line per leaf."""
     write_text(path, json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False) + "\n")
 
 

@@ -5,7 +5,7 @@ import { formOf, type MessageKey, type Messages } from "./message";
 export type { MessageKey };
 export type Translate = (key: MessageKey, values?: Record<string, string | number>) => string;
 
-/** A file a language, named by its tag: nothing else needs to know of it. A page loads those it speaks. */
+/** One file per language, named by its tag: nothing else needs to know of it. A page loads those it speaks. */
 const files = import.meta.glob<Messages>("./languages/*.json", { import: "default" });
 const loaders = Object.fromEntries(Object.entries(files).map(([path, load]) => [tagIn(path), load]));
 const catalogues: Partial<Record<string, Messages>> = {};

@@ -275,7 +275,7 @@ interface Group {
   readonly score: number;
 }
 
-/** Moments of one place and size, at most one a blink; the likeliest groups of different places. */
+/** Moments of one place and size, at most one per blink; the likeliest groups of different places. */
 function grouped(moments: readonly Moment[], aside: number): Group[] {
   const sorted = [...moments].sort((a, b) => b.score - a.score);
   const groups: Group[] = [];

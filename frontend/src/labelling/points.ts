@@ -1,4 +1,4 @@
-/** Landmarks of the eyes: 9 points an eye, pixel centers at whole numbers, x right, y down. */
+/** Landmarks of the eyes: 9 points per eye, pixel centers at whole numbers, x right, y down. */
 
 export type Point = readonly [x: number, y: number];
 export type Shape = readonly Point[];

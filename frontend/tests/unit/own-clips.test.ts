@@ -294,17 +294,17 @@ describe("the next step of a study", () => {
 
   it("is to fix what blocks, to preview, to rehearse, then to open it", () => {
     const all = [check("placeholders", true), check("not_tried"), check("rehearsal")];
-    expect(nextStep(study, all)).toEqual({ text: "Fix 1 thing on the checklist.", page: "" });
-    expect(nextStep(study, all.slice(1)).text).toContain("Preview");
-    expect(nextStep(study, all.slice(2)).page).toBe("/rehearsal");
-    expect(nextStep(study, []).text).toContain("pilot");
+    expect(nextStep(study, all)).toEqual({ step: "draft", text: "Fix 1 problem on the checklist.", page: "" });
+    expect(nextStep(study, all.slice(1))).toMatchObject({ step: "preview", text: expect.stringContaining("Preview") as string });
+    expect(nextStep(study, all.slice(2))).toMatchObject({ step: "rehearsal", page: "/rehearsal" });
+    expect(nextStep(study, [])).toMatchObject({ step: "pilot", text: expect.stringContaining("pilot") as string });
   });
 
   it("follows the status afterwards", () => {
     expect(nextStep({ ...study, status: "pilot" }, []).page).toBe("/results");
     expect(nextStep({ ...study, status: "live", quota: 20 }, []).text).toBe("Follow the participants on the monitor (3 of 20 complete).");
     expect(nextStep({ ...study, status: "live", paused: true }, []).page).toBe("/settings");
-    expect(nextStep({ ...study, status: "closed" }, []).page).toBe("/data");
+    expect(nextStep({ ...study, status: "closed" }, [])).toMatchObject({ step: "live", page: "/data" });
     expect(nextStep({ ...study, archived_at: "2026-01-01" }, []).page).toBe("/settings");
   });
 });

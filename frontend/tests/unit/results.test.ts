@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { cellRows, marginRows, cellLabels, cellPlot, countTicks } from "../../src/admin/results/plots";
-import { labelOfOrigin, counted } from "../../src/admin/ui/format";
+import { ago, labelOfOrigin, counted } from "../../src/admin/ui/format";
 import { seriesLabels, seriesPlot } from "../../src/admin/kinds/threshold/plots";
 import { csvText } from "../../src/admin/ui/figure-files";
 
@@ -32,6 +32,13 @@ describe("figures that are saved", () => {
 
   it("hold nothing that a spreadsheet would run, and keep commas and quotes", () => {
     expect(csvText([{ a: "=1+1", b: 'say "so", then', c: -1.5 }])).toBe('a,b,c\r\n\'=1+1,"say ""so"", then",-1.5\r\n');
+  });
+});
+
+describe("times", () => {
+  it("are just now, not 0 s ago", () => {
+    const at = (seconds: number) => ago("2026-01-01T00:00:00Z", new Date(Date.UTC(2026, 0, 1, 0, 0, seconds)).toISOString());
+    expect([at(0), at(4), at(5), at(90)]).toEqual(["just now", "just now", "5 s ago", "2 min ago"]);
   });
 });
 
@@ -70,6 +77,13 @@ describe("the answers in each cell", () => {
     expect(of([1, 2, 3, 4, 5, 6, 7]).x).toEqual({ label: "answer", ticks: [1, 2, 3, 4, 5, 6, 7] });
     const bins = Array.from({ length: 20 }, (_, bin) => 5 * bin);
     expect(of(bins).x).toEqual({ label: "answer, from the number on, 5 wide", ticks: [0, 10, 20, 30, 40, 50, 60, 70, 80, 90] });
+  });
+});
+
+describe("times", () => {
+  it("are just now, not 0 s ago", () => {
+    const at = (seconds: number) => ago("2026-01-01T00:00:00Z", new Date(Date.UTC(2026, 0, 1, 0, 0, seconds)).toISOString());
+    expect([at(0), at(4), at(5), at(90)]).toEqual(["just now", "just now", "5 s ago", "2 min ago"]);
   });
 });
 

@@ -26,7 +26,7 @@ def main() -> None:
     line = next(line for line in ran.stdout.splitlines() if line.startswith("RESULT"))
     used = json.loads(line.removeprefix("RESULT "))
     sys.stdout.write(
-        f"add-on: 36,000 frames, {used['keys']} keys an eye, filled in {used['fill_s']:.3f} s of processor "
+        f"add-on: 36,000 frames, {used['keys']} keys per eye, filled in {used['fill_s']:.3f} s of processor "
         f"time (must 1 s), {used['fill_s'] / used['baseline_s']:.2f} times 1,000 single keys\n"
     )
 

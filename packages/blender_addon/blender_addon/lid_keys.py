@@ -35,7 +35,7 @@ class Passage:
 
 
 def flag_holds(up: npt.NDArray[np.bool_], fps: float) -> tuple[Hold, ...]:
-    """When a flag is up that has a value a frame: from its first frame to the first one after it."""
+    """When a flag is up that has one value per frame: from its first frame to the first one after it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], up, [False]]).astype(int)))
     return tuple(Hold(first / fps, after / fps) for first, after in edges.reshape(-1, 2).tolist())
 
@@ -72,7 +72,7 @@ def one_blink(fps: float, seed: int) -> Performance:
 
 
 def lid_keys(closure: Array, start: int, density: Density = "EVERY_FRAME") -> LidKeys:
-    """The keys of one eye's closure, a value a frame from frame `start` on.
+    """The keys of one eye's closure, one value per frame from frame `start` on.
 
     `EVERY_FRAME` keys each frame of a blink and the open frame on either side, to be joined by straight
     lines: the curve is then the engine's at every frame. `FEW` keys onset, first and last frame of the

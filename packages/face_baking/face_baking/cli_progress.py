@@ -19,7 +19,7 @@ Report = Callable[[int, int, str], None]
 
 @contextmanager
 def baking(name: str) -> Iterator[Report]:
-    """A function to report (done, total, what) to: a bar on a terminal, else a line a picture on stderr."""
+    """A function to report (done, total, what) to: a bar on a terminal, else one stderr line per picture."""
     if not sys.stderr.isatty():
         yield _lines(name)
         return

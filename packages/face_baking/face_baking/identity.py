@@ -16,7 +16,7 @@ MAX_SEED = 999_999
 MAX_DEVIATIONS = 1.6
 """Identity modes stay within so many standard deviations: the kit's scans hold few faces beyond."""
 UNEVEN_CM, UNEVEN_PER_CM = 0.05, 0.3
-"""Waves that make the halves of a face differ: size, and how many a cm. The kit's modes are symmetrical."""
+"""Waves that make the halves of a face differ: size, and how many per cm. The kit's modes are symmetrical."""
 Share = Annotated[float, Field(ge=0, le=1)]
 Colour = tuple[Share, Share, Share]
 

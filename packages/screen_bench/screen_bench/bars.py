@@ -38,7 +38,7 @@ def planes(number: int, height_px: int = HEIGHT_PX) -> NDArray[np.uint8]:
 
 
 def read(values: Sequence[int]) -> int:
-    """The frame's number from one gray value a bar; SURROUND where all are gray, else UNREADABLE."""
+    """The frame's number from one gray value per bar; SURROUND where all are gray, else UNREADABLE."""
     if all(DARK_BELOW <= value <= LIGHT_ABOVE for value in values):
         return SURROUND
     if any(DARK_BELOW <= value <= LIGHT_ABOVE for value in values):

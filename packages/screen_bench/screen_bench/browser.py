@@ -1,4 +1,4 @@
-"""A headed browser on the display, driven by `frontend/tests/scope/driver.mjs`, one JSON line a question."""
+"""A headed browser driven by `frontend/tests/scope/driver.mjs`, one JSON line per question."""
 
 import json
 import os

@@ -32,7 +32,7 @@ class FrameBuffer:
             self._map = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)
         words = struct.unpack(f">{HEADER_WORDS}I", self._map[: 4 * HEADER_WORDS])
         if words[BITS_PER_PIXEL] != 32:
-            raise ValueError(f"expected 32 bits a pixel in {path}, got {words[BITS_PER_PIXEL]}")
+            raise ValueError(f"expected 32 bits per pixel in {path}, got {words[BITS_PER_PIXEL]}")
         self.width, self.height, self._line = words[WIDTH], words[HEIGHT], words[BYTES_PER_LINE]
         self._start = words[HEADER_SIZE] + words[COLOURS] * COLOUR_BYTES
 

@@ -162,7 +162,7 @@ def _one_pair(display: Display, driver: Browser) -> None:
 
 
 def _records(server: ServerProcess, plays: int) -> list[tuple[object, ...]]:
-    """The stored frame logs of each pair of the latest run, a log a clip."""
+    """The stored frame logs of each pair of the latest run, one log per clip."""
     latest = "(SELECT max(id) FROM study_runs)"
     server.rows_soon(f"SELECT id FROM views WHERE study_run_id = {latest} AND outcome = 'shown'", plays)
     with migrated_services(server.settings) as services, services.database.read() as session:

@@ -59,7 +59,7 @@ class Result:
 
 
 class Results:
-    """A file of results, one JSON object a line.
+    """A file of results, one JSON object per line.
 
     Results of one key add up, and what has as many plays as asked for, or more, is not measured again. Those
     of other sources (`measured_sha256`) stay in the file and count for nothing; so do, with `again`, those

@@ -9,7 +9,7 @@ numbers = st.integers(0, bars.MAX_FRAMES - 1)
 
 
 def values(number: int) -> list[int]:
-    """One gray value a bar, as a frame buffer would hold it."""
+    """One gray value per bar, as a frame buffer would hold it."""
     return [235 if white else 16 for white in bars.pattern(number)]
 
 

@@ -44,5 +44,5 @@ def test_a_clip_outside_the_display_is_refused(tmp_path: Path) -> None:
 
 def test_a_display_of_other_depth_is_refused(tmp_path: Path) -> None:
     write_display(tmp_path / "screen", bits=16)
-    with pytest.raises(ValueError, match="expected 32 bits a pixel"):
+    with pytest.raises(ValueError, match="expected 32 bits per pixel"):
         FrameBuffer(tmp_path / "screen")

@@ -73,7 +73,7 @@ def _recording(entry: dict[str, object]) -> Recording:
 def load_library(*, paired: bool = False) -> tuple[BlinkProfile, ...]:
     """Return the shipped profiles, in the order of the table.
 
-    One profile an eye and blink; with `paired`, the blinks seen in both eyes, left in `closure`, right in
+    One profile per eye and blink; with `paired`, the blinks seen in both eyes, left in `closure`, right in
     `closure_other` (the same blinks again).
     """
     chosen = [profile for profile in _shipped() if (profile.closure_other is not None) == paired]

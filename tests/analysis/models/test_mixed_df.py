@@ -74,7 +74,7 @@ def few(people: int = 5, clips: int = 4, seed: int = 3, between: float = 0.7) ->
 
 
 def dense_deviance(rows: pd.DataFrame, sd: float, sigma: float, beta: tuple[float, float]) -> float:
-    """-2 log likelihood of an intercept a participant, from the covariance of all ratings."""
+    """-2 log likelihood of an intercept per participant, from the covariance of all ratings."""
     same = rows["who"].to_numpy()[:, None] == rows["who"].to_numpy()[None, :]
     v = sd**2 * same + sigma**2 * np.eye(len(rows))
     residual = rows["y"].to_numpy() - beta[0] - beta[1] * np.where(rows["A"] == "a0", 1.0, -1.0)

@@ -236,7 +236,7 @@ def test_separated_ratings_are_refused(shared):
 
 
 def drawn(seed: int, sd_item: float = 0.0) -> pd.DataFrame:
-    """Ten people, two crossed factors, three clips a cell, four categories of which the last is rare."""
+    """Ten people, two crossed factors, three clips per cell, four categories of which the last is rare."""
     rng = np.random.default_rng(seed)
     rows = pd.DataFrame(
         [(f"p{p}", a, b, f"{a}{b}{k}") for p in range(10) for a in "mn" for b in "xy" for k in range(3)],

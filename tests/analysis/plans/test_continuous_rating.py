@@ -1,4 +1,4 @@
-"""From rows to traces: clips that share a file are several trials, and a panel a cell marks their blinks."""
+"""From rows to traces: clips that share a file are several trials; one panel per cell marks their blinks."""
 
 from types import SimpleNamespace
 from typing import Any

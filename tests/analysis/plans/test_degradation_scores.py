@@ -24,7 +24,7 @@ T_25 = 2.059539
 
 
 def contents() -> Iterator[dict[str, str]]:
-    """The votes of each content by video, a digit a person."""
+    """The votes of each content by video, one digit per person."""
     with (GOLDEN / "nflx_public.csv").open(encoding="utf-8") as file:
         rows = sorted(csv.DictReader(file), key=lambda row: row["content"])
     for _, of in itertools.groupby(rows, key=lambda row: row["content"]):

@@ -317,7 +317,7 @@ def test_groups_are_analysed_for_themselves_and_compared(tmp_path, cartoon, agre
     assert len({table.key for part in found.parts for table in part.tables}) == sum(
         len(part.tables) for part in found.parts
     )
-    # One ability and one for ties a group; two groups.
+    # One ability and one for ties per group; two groups.
     assert found.numbers["agreement"]["df"] == 2
     assert (found.numbers["agreement"]["p"] > 0.05) == agree
 

@@ -1,4 +1,4 @@
-"""A study with several scales: a part of the report a scale, and how far they agree."""
+"""A study with several scales: a part of the report per scale, and how far they agree."""
 
 import csv
 import json

@@ -17,7 +17,7 @@ PEOPLE = ("p1", "p2", "p3")
 
 
 def folder_of(folder: Path, psychopy: bool = False) -> Path:
-    """A folder with a file a person, without a column of people."""
+    """A folder with one file per person, without a column of people."""
     folder.mkdir()
     for number, person in enumerate(PEOPLE):
         rows = [f"calm,{number + 1}", f"wild,{number + 3}"]
@@ -156,7 +156,7 @@ def test_a_header_alone_is_not_a_row_however_it_is_written(tmp_path, text) -> No
 
 
 def psych_ds_of(folder: Path, named: str) -> None:
-    """A Psych-DS folder of two rows a person, in files called as `named` says."""
+    """A Psych-DS folder of two rows per person, in files called as `named` says."""
     (folder / "data").mkdir()
     (folder / "dataset_description.json").write_text("{}", encoding="utf-8")
     for person in PEOPLE:

@@ -266,7 +266,7 @@ def test_every_page_of_a_study_says_its_step_and_what_comes_next(
         steps = page.get_by_role("list", name="Steps of the study")
         expect(steps.locator("[aria-current=step]")).to_have_text("Draft")
         expect(
-            page.get_by_role("link", name=re.compile(r"Fix \d things? on the checklist\."))
+            page.get_by_role("link", name=re.compile(r"Fix \d problems? on the checklist\."))
         ).to_be_visible()
     page = dashboard.open("/studies/short")
     steps = page.get_by_role("list", name="Steps of the study")

@@ -23,9 +23,9 @@ def walked(dashboard: Dashboard, recruiter: dict[str, Any]) -> Locator:
     assert answer.ok, answer.text()
     dashboard.open("/studies/short/settings?part=recruitment")
     with page.expect_popup():
-        page.get_by_role("button", name="Test the way back").click()
+        page.get_by_role("button", name="Test the redirect").click()
     steps = page.get_by_role("list", name="Self-test")
-    expect(page.get_by_role("button", name="Test the way back")).to_be_enabled(timeout=120_000)
+    expect(page.get_by_role("button", name="Test the redirect")).to_be_enabled(timeout=120_000)
     return steps.get_by_role("listitem")
 
 
@@ -38,7 +38,7 @@ def walked(dashboard: Dashboard, recruiter: dict[str, Any]) -> Locator:
                 "kind": "sona",
                 "redirect_url": "https://lab.sona-systems.com/done?credit={survey_code}&run={run}",
             },
-            "No code is configured; this run got its own",
+            "No code is configured; this run got a random one",
             "https://lab.sona-systems.com/done?credit=selftest&run=",
         ),
         ({"kind": "mturk"}, "No code is configured", "No redirect URL is configured"),

@@ -84,7 +84,9 @@ def test_steps_count_what_is_shown_and_practice_says_what_it_is(
     visit = Visit(page, server.address, lambda _: steps.extend(page.locator(".eyebrow").all_inner_texts()))
     visit.open(study.link_token).begin().instructions()
     assert [step for step in steps if "of" in step] == ["Step 1 of 3", "Step 2 of 3", "Step 3 of 3"]
-    page.wait_for_selector("text=Practice clips: 1. These answers do not count.")
+    page.wait_for_selector(
+        "text=We begin with 1 practice clip. Your practice answer is not used in the study."
+    )
     assert axe_violations(page) == []
 
 

@@ -39,7 +39,7 @@ def test_links_that_lead_nowhere(server: ServerProcess, tmp_path: Path, page: Pa
     study = server.add_study(tmp_path / "clips", PLAIN)
     server.start()
     visit = Visit(page, server.address).open("no-such-link")
-    page.wait_for_selector("text=This link is not known")
+    page.wait_for_selector("text=This link is not valid")
     assert axe_violations(page) == []
     study.change(status="closed")
     visit.open(study.link_token)

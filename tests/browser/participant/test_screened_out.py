@@ -59,7 +59,7 @@ def test_failed_attention_checks_end_the_visit(server: ServerProcess, tmp_path: 
         visit.rate("4")
     asked = int(page.inner_text(".question strong"))
     page.keyboard.press(str(asked % 7 + 1))
-    page.wait_for_selector("text=this study is not for you")
+    page.wait_for_selector("text=you do not meet the requirements")
     assert axe_violations(page) == []
     assert page.query_selector(".code") is None  # no code is declared, so nobody is paid by mistake
     assert [row["status"] for row in server.rows(STATUS)] == ["screened_out"]
@@ -105,7 +105,7 @@ def test_a_clip_that_cannot_fit_screens_out_on_request(
     page.wait_for_selector("text=The clip does not fit")
     assert axe_violations(page) == []
     page.click("text=I have no larger screen")
-    page.wait_for_selector("text=this study is not for you")
+    page.wait_for_selector("text=you do not meet the requirements")
     assert [row["status"] for row in server.rows(STATUS)] == ["screened_out"]
     assert "clip_too_large" in str(server.rows(REASON))
 

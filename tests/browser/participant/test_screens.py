@@ -46,7 +46,7 @@ def test_the_blind_spot_gives_the_distance(server: ServerProcess, tmp_path: Path
     page.wait_for_selector(".prose")
     stored = server.rows_soon("SELECT viewing_distance_mm FROM calibrations", 1)[0]["viewing_distance_mm"]
     median_mm = sorted(seen)[2] / CARD_PX_PER_MM / TAN_13_5_DEGREES
-    # Between reading the separation and the press the dot goes on, 0.1 px a millisecond.
+    # Between reading the separation and the press the dot goes on, 0.1 px per millisecond.
     assert median_mm - 5 < stored < median_mm + 60
 
 

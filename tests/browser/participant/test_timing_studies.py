@@ -13,7 +13,7 @@ from tests.helpers.tiny_clips import make_clip_folder
 pytestmark = pytest.mark.browser
 FRAMES = 6
 TRIALS = {"timing": 4, "timing-continuous": 4, "timing-pairs": 6}
-"""With one exemplar a cell, practice aside."""
+"""With one exemplar per cell, practice aside."""
 
 
 @pytest.mark.parametrize("name", TRIALS)

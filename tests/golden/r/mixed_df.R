@@ -36,7 +36,7 @@ tests_of <- function(fit) {
       se = unbox(rows[n, 2]), df = unbox(rows[n, 3]), t = unbox(rows[n, 4]))))
 }
 
-# lme4 interpolates the profile; 40 points a side make its splines good to five digits
+# lme4 interpolates the profile; 40 points per side make its splines good to five digits
 intervals_of <- function(formula, data) {
   fit <- lme4::lmer(formula, data, control = tight)
   profile <- profile(fit, signames = FALSE, maxpts = 200, delta = 0.1, delta.cutoff = 1 / 40)

@@ -24,7 +24,7 @@ def test_the_number_of_statements_does_not_grow_with_the_number_of_links(
     with statements(services) as many:
         links = made(experimenter, kind="personal", count=1200)
     assert len(links) == 1200
-    # PostgreSQL takes a thousand rows a statement.
+    # PostgreSQL takes a thousand rows per statement.
     assert len(many) <= len(few) + 2
     assert len({link["url"] for link in links}) == 1200
 

@@ -40,7 +40,7 @@ def still(path: Path, size_px: tuple[int, int], frames: int, fps: int = 30) -> P
 
 
 def gif(path: Path, frames: int, delay_cs: int) -> Path:
-    """Frames of one pixel on a large canvas: 23 bytes a frame."""
+    """Frames of one pixel on a large canvas: 23 bytes per frame."""
     head = b"GIF89a" + struct.pack("<HHBBB", SIDE, SIDE, 0x80, 0, 0) + bytes(6)
     frame = (
         b"\x21\xf9\x04\x04" + struct.pack("<H", delay_cs) + b"\0\0\x2c" + struct.pack("<HHHHB", 0, 0, 1, 1, 0)
@@ -54,7 +54,7 @@ def chunk(name: bytes, content: bytes) -> bytes:
 
 
 def apng(path: Path, frames: int) -> Path:
-    """Frames of one pixel on a large canvas: about 70 bytes a frame."""
+    """Frames of one pixel on a large canvas: about 70 bytes per frame."""
     parts = [
         b"\x89PNG\r\n\x1a\n",
         chunk(b"IHDR", struct.pack(">IIBBBBB", SIDE, SIDE, 8, 0, 0, 0, 0)),
@@ -70,7 +70,7 @@ def apng(path: Path, frames: int) -> Path:
 
 
 def repeated_mp4(path: Path, times: int) -> Path:
-    """An MP4 file whose index says that one frame is there many times: four bytes a frame."""
+    """An MP4 file whose index says that one frame is there many times: four bytes per frame."""
     content = bytearray(still(path, (SIDE, SIDE), 2).read_bytes())
     moov = content.index(b"moov") - 4
     stbl, offset = content.index(b"stbl") - 4, content.index(b"stsz") - 4

@@ -152,7 +152,7 @@ def test_clips_are_what_the_manifest_promises(performed: Path) -> None:
         elif clip.blinks_s:
             assert clip.onset_frame == int(clip.blinks_s[0] * 300) // 10
     assert any(clip.blinks_s for clip in manifest.clips if clip.levels["profile"] == "real")
-    # Open eyes are the same picture throughout, so these clips share one file a character.
+    # Open eyes are the same picture throughout, so these clips share one file per character.
     assert len({clip.file for clip in manifest.clips if not clip.blinks_s}) == 2
     assert '"blinks_s"' in (performed / "clips" / "manifest.json").read_text()
 

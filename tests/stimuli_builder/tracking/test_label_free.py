@@ -96,7 +96,7 @@ def test_a_model_of_detections_tracks_and_states_an_error_like_its_own(free, rec
         true.append(np.sqrt(((frame.points - recording.points[number]) ** 2).sum(1).mean()))
         stated.append(np.sqrt((frame.errors**2).mean()))
     assert np.sqrt(np.mean(np.square(true))) < 0.8
-    # The labels' noise (0.85 px a point) and the detector's usual error are stated, and not in the true one.
+    # The labels' noise (0.85 px per point) and the detector's error are stated, but not in the true one.
     known = np.hypot(0.85, FACE_SHARE * widths(recording.points[0]))
     assert np.mean(true) < np.mean(stated) < known + 2 * np.mean(true)
 

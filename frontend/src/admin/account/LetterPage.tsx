@@ -48,7 +48,7 @@ function MailPage() {
       {send.isSuccess ? (
         <Alert title="Email address confirmed" role="status">
           <Anchor component={Link} to="/">
-            Go on
+            Continue
           </Anchor>
         </Alert>
       ) : (

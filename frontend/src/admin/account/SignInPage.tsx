@@ -19,7 +19,7 @@ function CodeForm() {
     },
   });
   return (
-    <EntryForm sending={send} button="Go on">
+    <EntryForm sending={send} button="Continue">
       <CodeField value={code} onChange={setCode} />
     </EntryForm>
   );

@@ -96,9 +96,9 @@ function UploadProgress({ upload: { sending, broken, progress, goOn } }: { uploa
   if (broken !== null) {
     return (
       <Alert color="red" variant="light" title="The upload stopped" role="alert">
-        <Text size="sm">{broken.message} What has come is kept.</Text>
+        <Text size="sm">{broken.message} The part uploaded so far is kept.</Text>
         <Button mt="xs" size="xs" variant="default" onClick={goOn}>
-          Go on
+          Continue
         </Button>
       </Alert>
     );

@@ -184,7 +184,10 @@ function Unsealed({ study, seal }: Props) {
     touches: [["study", study, "seal"]],
     done: "Plan sealed.",
   });
-  if (seal.participants > 0) return <Text size="sm">Not sealed: already started by {counted(seal.participants, "participant")}.</Text>;
+  if (seal.participants > 0) {
+    const have = counted(seal.participants, "participant has", "participants have");
+    return <Text size="sm">The plan can no longer be sealed: {have} already started.</Text>;
+  }
   if (!mayChange) return <Text size="sm">Not sealed yet.</Text>;
   return (
     <Group align="end">

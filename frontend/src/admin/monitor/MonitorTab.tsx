@@ -134,7 +134,7 @@ function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: number }) 
   );
 }
 
-// One run of the heat map: a picture one pixel a trial, stretched by the page.
+// One run of the heat map: a picture one pixel per trial, stretched by the page.
 
 function HeatRow({ heat, label }: { heat: string; label: string }) {
   const canvas = useRef<HTMLCanvasElement>(null);

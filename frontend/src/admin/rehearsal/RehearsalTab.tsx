@@ -47,7 +47,7 @@ function Summary({ result }: Props) {
   return (
     <Part title="Time">
       <Text>
-        {result.complete} of {result.participants} came to the end and left {result.answers} answers. By the declared seconds a trial, the
+        {result.complete} of {result.participants} came to the end and left {result.answers} answers. At the declared seconds per trial, the
         trials take {fixed(result.expected_minutes, 1)} minutes; by clips and simulated answers{" "}
         {fewest === most ? most : `${fewest} to ${most}`} minutes, without consent, forms, instructions and breaks.
       </Text>

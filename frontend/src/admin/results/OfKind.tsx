@@ -26,8 +26,8 @@ export function OfKind({ study, data, factors }: ShownResults) {
       <Alert>
         Data series {data.series}, {labelOfOrigin(data.origin).toLowerCase()}: {counted(data.participants, "run")} with answers,{" "}
         {counted(data.ratings, "answer")}, counted {when(data.counted_at)}.{" "}
-        {data.origin === "simulated" && "Simulated participants: no person gave these answers. "}Live preview. For the analysis, see the
-        report below.
+        {data.origin === "simulated" && "Simulated participants: no person gave these answers. "}The charts update as answers arrive. For
+        the analysis, see the report below.
       </Alert>
       {KindResults !== undefined && <KindResults study={study} data={data} factors={factors} />}
       {data.kind === "other" && (

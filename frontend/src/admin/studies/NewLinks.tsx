@@ -8,7 +8,7 @@ import { useChange } from "../ui/useChange";
 const MEANS: Record<Schemas["NewLinks"]["kind"], string> = {
   general: "Anyone can use the same link.",
   personal: "Each link is for one person, who can continue on another device.",
-  preview: "For you: works for drafts too; answers are not kept.",
+  preview: "For yourself, also for a draft. Preview answers are not part of the results and are deleted later.",
 };
 const RECRUITERS = ["none", "prolific", "sona", "mturk", "generic"] as const;
 

@@ -86,8 +86,8 @@ async function walk(study: string, recruiter: Texts, opened: Window, say: (steps
   const steps: Step[] = [
     { label: `The study opens with the parameters of ${service}`, passed: null, detail: "" },
     { label: "A simulated participant finishes", passed: null, detail: "" },
-    { label: "The completion code is the one configured", passed: null, detail: "" },
-    { label: "The way back is the one configured", passed: null, detail: "" },
+    { label: "The completion code is as configured", passed: null, detail: "" },
+    { label: "The redirect is as configured", passed: null, detail: "" },
     { label: "The test is left out of the results", passed: null, detail: "" },
   ];
   const note = (index: number, passed: boolean, detail: string) => {
@@ -110,7 +110,7 @@ async function walk(study: string, recruiter: Texts, opened: Window, say: (steps
     note(1, true, "It is a preview, answered without showing the clips.");
     now = 2;
     const declared = textOf(recruiter, "code_complete");
-    if (declared === "") note(2, recruiter["kind"] !== "prolific", `No code is configured; this run got its own, ${code}.`);
+    if (declared === "") note(2, recruiter["kind"] !== "prolific", `No code is configured; this run got a random one, ${code}.`);
     else note(2, code === declared, code === declared ? code : `expected ${declared}, got ${code}`);
     now = 3;
     const expected = expectedReturn(recruiter, code, address.searchParams);
@@ -151,11 +151,11 @@ export function SelfTest({ detail }: { detail: Schemas["StudyDetail"] }) {
   return (
     <Stack gap="xs" align="flex-start">
       <Text size="sm">
-        4. Test the way back: a simulated participant with a test id takes a preview of the study in a separate window. The saved settings
-        are tested, by a preview link; links with a separate recruiter are not.
+        4. Test the redirect: a simulated participant with a test ID takes a preview of the study in a separate window. This tests the saved
+        settings, but not links with their own recruiter.
       </Text>
       <Button variant="default" onClick={begin} loading={test.isPending}>
-        Test the way back
+        Test the redirect
       </Button>
       {steps.length > 0 && (
         <List size="sm" aria-label="Self-test" role="list" aria-live="polite">

@@ -46,11 +46,14 @@ export function TurnedAway({ study, design, isHere = false }: TurnedAwayProps) {
 const STEPS = [
   ["draft", "Draft"],
   ["preview", "Preview"],
+  ["rehearsal", "Rehearsal"],
   ["pilot", "Pilot"],
   ["live", "Live"],
 ] as const;
 
 interface Next {
+  /** The step of the study that this is. */
+  step: (typeof STEPS)[number][0];
   text: string;
   /** The page on which it is done; null where the buttons above do it. */
   page: "" | "/rehearsal" | "/results" | "/monitor" | "/settings" | "/data" | null;
@@ -62,22 +65,25 @@ export function nextStep(
   checks: readonly Schemas["LaunchCheck"][],
 ): Next {
   const { status, paused, archived_at, complete, quota } = summary;
-  if (archived_at !== null) return { text: "This study is in the archive. Restore it under Settings to change it.", page: "/settings" };
-  if (status === "closed") return { text: "Build the report and download the data.", page: "/data" };
+  const step = status === "closed" ? "live" : status;
+  if (archived_at !== null)
+    return { step, text: "This study is in the archive. Restore it under Settings to change it.", page: "/settings" };
+  if (status === "closed") return { step, text: "Build the report and download the data.", page: "/data" };
   const fix = checks.filter(({ blocks }) => blocks).length;
   const has = (kind: string) => checks.some((check) => check.kind === kind);
-  if (status !== "live" && fix > 0) return { text: `Fix ${counted(fix, "thing")} on the checklist.`, page: "" };
-  if (paused) return { text: "The study is paused. Let participants begin under Settings.", page: "/settings" };
+  if (status !== "live" && fix > 0) return { step, text: `Fix ${counted(fix, "problem")} on the checklist.`, page: "" };
+  if (paused) return { step, text: "The study is paused. Let participants begin under Settings.", page: "/settings" };
   if (status === "live")
     return {
+      step,
       text: `Follow the participants on the monitor (${String(complete)}${quota === null ? "" : ` of ${String(quota)}`} complete).`,
       page: "/monitor",
     };
   if (status === "pilot")
-    return { text: `Look at the results of the pilot (${String(complete)} complete), then set the study live.`, page: "/results" };
-  if (has("not_tried")) return { text: "Preview the study as a participant.", page: null };
-  if (has("rehearsal")) return { text: "Rehearse the study with simulated people.", page: "/rehearsal" };
-  return { text: "Open the study as a pilot, or set it live.", page: null };
+    return { step, text: `Look at the results of the pilot (${String(complete)} complete), then set the study live.`, page: "/results" };
+  if (has("not_tried")) return { step: "preview", text: "Preview the study as a participant.", page: null };
+  if (has("rehearsal")) return { step: "rehearsal", text: "Rehearse the study with simulated people.", page: "/rehearsal" };
+  return { step: "pilot", text: "Open the study as a pilot, or set it live.", page: null };
 }
 
 const FRESH_MS = 20_000;
@@ -86,9 +92,8 @@ export function StudySteps({ summary }: { summary: Schemas["StudySummary"] }) {
   // Runs end while somebody looks at the page.
   useQuery({ ...studyQuery(summary.name), refetchInterval: summary.status === "live" || summary.status === "pilot" ? FRESH_MS : false });
   const checks = useQuery(launchChecksQuery(summary.name)).data;
-  const tried = checks !== undefined && !checks.some(({ kind }) => kind === "not_tried");
-  const now = summary.status === "draft" ? (tried ? 1 : 0) : summary.status === "pilot" ? 2 : 3;
   const next = checks === undefined ? null : nextStep(summary, checks);
+  const now = STEPS.findIndex(([step]) => step === (next?.step ?? summary.status));
   return (
     <Group gap="md" justify="space-between" className="study-steps">
       <ol aria-label="Steps of the study">

@@ -83,7 +83,7 @@ const NEXT: Record<Status, Status[]> = { draft: ["pilot", "live"], pilot: ["draf
 const WORDS: Record<Status, [label: string, question: string]> = {
   draft: ["Back to draft", "Participants can no longer start; pilot data stay."],
   pilot: ["Open as pilot", "Participants can start; their data are marked as pilot."],
-  live: ["Set live", "Participants can start and their data count. Changes now create new versions."],
+  live: ["Set live", "Participants can start, and their data are used in the analysis. Every change now creates a new version."],
   closed: ["Close study", "No one can start any more. Runs in progress can finish."],
 };
 

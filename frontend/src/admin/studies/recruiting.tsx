@@ -7,7 +7,7 @@ import { api, unwrap } from "../api";
 import { Answer } from "../ui/Answer";
 import { useChange } from "../ui/useChange";
 
-/** Opens a preview, whose answers do not count, in a new tab. */
+/** Opens a preview in a new tab. */
 export function PreviewButton({ study, small = false }: { study: string; small?: boolean }) {
   const preview = useChange(
     () =>

@@ -114,7 +114,7 @@ function element(name: string, attributes: Record<string, string | number>, text
   return made;
 }
 
-/** The numbers of a figure, a line a row; a text that a spreadsheet would run begins with an apostrophe. */
+/** The numbers of a figure, one line per row; a text that a spreadsheet would run begins with an apostrophe. */
 export function csvText(rows: readonly Row[]): string {
   const names = [...new Set(rows.flatMap((row) => Object.keys(row)))];
   const lines = [names, ...rows.map((row) => names.map((name) => row[name]))];

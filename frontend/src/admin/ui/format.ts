@@ -21,6 +21,7 @@ export function soon(moment: string | null, now: string): string {
 
 export function ago(moment: string, now: string): string {
   const seconds = Math.max(0, (Date.parse(now) - Date.parse(moment)) / 1000);
+  if (seconds < 5) return "just now";
   if (seconds < 60) return `${Math.round(seconds)} s ago`;
   if (seconds < 3600) return `${Math.round(seconds / 60)} min ago`;
   return seconds < 172_800 ? `${Math.round(seconds / 3600)} h ago` : `${Math.round(seconds / 86_400)} days ago`;

@@ -18,9 +18,9 @@ const CARD_HEIGHT_MM = 53.98;
 const SHAPE = CARD_HEIGHT_MM / CARD_WIDTH_MM;
 const SMALLEST_PX = 120;
 const LARGEST_PX = 1_600;
-/** Shown lengths begin between these: a card on screens of 54 to 152 pixels an inch. */
+/** Shown lengths begin between these: a card on screens of 54 to 152 pixels per inch. */
 const START_PX = [180, 510] as const;
-/** What a screen of 96 pixels an inch needs. */
+/** What a screen of 96 pixels per inch needs. */
 const USUAL_PX = (CARD_WIDTH_MM * 96) / 25.4;
 /** A narrower window (a phone) cannot hold a card lying down, so there it stands upright. */
 const UPRIGHT_BELOW_PX = 600;
@@ -199,7 +199,7 @@ interface Turn {
   eyebrow: string;
   round: number;
   times: number;
-  /** px a mm of the measurement before. */
+  /** px per mm of the measurement before. */
   last: number | null;
   /** What is to be said first, such as that the last two differ. */
   remark: string;

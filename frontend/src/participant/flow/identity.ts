@@ -1,4 +1,4 @@
-/** Which visit this browser is in: a client id a link, so that starting twice gives the same run. */
+/** Which visit this browser is in: one client id per link, so that starting twice gives the same run. */
 import type { LinkState } from "../../api/schema";
 
 const RECRUITER_KEYS = 20;

@@ -9,7 +9,7 @@ export interface DecodedClip {
   height: number;
 }
 
-/** A clip whose frames, four bytes a pixel, take more than this is decoded while it is shown. */
+/** A clip whose frames, four bytes per pixel, take more than this is decoded while it is shown. */
 const MAX_KEPT_BYTES = 1 << 28;
 const MAX_KEPT_FRAMES = 900;
 

@@ -18,7 +18,7 @@ interface Data {
 
 type WithClips = Pick<TrialInfo, "clip_sha256"> & Partial<Pick<TrialInfo, "clips">>;
 
-/** Every clip of these trials. A visit that an earlier page has kept knows one clip a trial. */
+/** Every clip of these trials. A visit that an earlier page has kept knows one clip per trial. */
 export function sourcesOf(trials: readonly WithClips[]): ClipSource[] {
   return trials.flatMap(({ clips, clip_sha256 }) =>
     (clips ?? [{ clip_sha256 }]).flatMap(({ clip_sha256: sha256 }) =>

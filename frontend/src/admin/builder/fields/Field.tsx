@@ -1,4 +1,4 @@
-/** The editors of the declaration's keys, chosen by their schema: tables, lists of tables, and an element a line. */
+/** The editors of the declaration's keys, chosen by their schema: tables, lists of tables, and an element per line. */
 
 import { SimpleGrid, Stack, Textarea, Button, Group, TextInput, Alert, Fieldset, Menu, Select, Switch, Text } from "@mantine/core";
 import { useState } from "react";
@@ -35,9 +35,9 @@ import {
 import { type FieldProps, useField, Choice, Flag, Lists, Numeric, OneText, Raw, Translated, Words } from "./scalars";
 import { useBuilderHere } from "../useBuilder";
 
-// Editors that take an element a line.
+// Editors that take an element per line.
 
-/** Texts in an order, each in every language: a line a text. */
+/** Texts in an order, each in every language: one line per text. */
 function Translations(props: FieldProps) {
   const { value, label, help, problem, set, builder } = useField(props);
   const texts = Array.isArray(value) ? (value as unknown[]) : [];
@@ -95,7 +95,7 @@ function valueOf(entered: string, of: "text" | "number"): string | number {
   return of === "number" && entered !== "" && Number.isFinite(Number(entered)) ? Number(entered) : entered;
 }
 
-/** Words that stand for words or numbers: `key = value`, one a line. */
+/** Words that stand for words or numbers: `key = value`, one per line. */
 function Dictionary(props: FieldProps) {
   const { value, label, help, problem, set } = useField(props);
   const editor = editorOf(props.schema);
@@ -502,7 +502,7 @@ function Add({ path, of }: { path: Path; of: Schema }) {
   );
 }
 
-/** A table a language. */
+/** One table per language. */
 function ByLanguage(props: FieldProps) {
   const { builder } = useField(props);
   const editor = editorOf(props.schema);

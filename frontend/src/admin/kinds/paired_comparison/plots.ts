@@ -14,7 +14,7 @@ export function comparedCells({ pairs }: Data, factors: Factors): Map<string, st
   );
 }
 
-/** One row and column a cell, columns by the numbers of the rows: how often that of the row was chosen over that of the column. */
+/** One row and column per cell, columns by the numbers of the rows: how often that of the row was chosen over that of the column. */
 export function choicePlot({ pairs }: Data, labels: Map<string, string>): Plot.PlotOptions {
   const names = [...labels.values()];
   const numbers = new Map(names.map((name, index) => [name, String(index + 1)]));
