@@ -159,7 +159,7 @@ def back(
 ) -> None:
     """Restore the SQLite database to an earlier moment; stop the server first.
 
-    The present database is kept next to it under another name: remove it when all is well. People erased
+    The current database is kept next to it under another name; remove it once everything works. People erased
     since then are erased again. Clips stay as they are.
 
     Examples:

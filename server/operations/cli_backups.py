@@ -159,7 +159,7 @@ def backup_key(
     """Create a key pair for encrypted backups, and print the public key.
 
     Set PALPEBRA_BACKUP_RECIPIENT to the public key. Keep the private key off the server, in two safe places:
-    without it no backup can be read. It is a key of age (age-encryption.org); `age -d -i FILE` reads backups.
+    without it no backup can be read. It is an age key (age-encryption.org); `age -d -i FILE` reads backups.
     Example: server backup-key /media/safe/backups.key
     """
     public = make_identity(file)
@@ -210,7 +210,7 @@ def restore(
 ) -> None:
     """Restore a backup into an empty database (SQLite or PostgreSQL) and clip store.
 
-    The database of the settings must be empty; stop the server first. Counts and hashes are compared. People
+    Stop the server first; the database in the settings must be empty. Counts and hashes are verified. People
     who were erased since the backup are erased again, by the ledger of erasures (erasures.ndjson) next to the
     backup or in the data folder.
 
@@ -265,7 +265,7 @@ def drill(
     when_due: Annotated[
         bool,
         typer.Option(
-            "--when-due", help="Only if the last drill is at least a week old (a day if it failed)."
+            "--when-due", help="Run only if the last drill is at least a week old (a day if it failed)."
         ),
     ] = False,
     identity: IdentityFile = None,

@@ -178,7 +178,7 @@ def set_status(
     status: Annotated[str, typer.Argument(help="draft, pilot, live or closed.")],
     anyway: Annotated[
         bool,
-        typer.Option(help="Set it live although clips are missing or do not decode; this is audited."),
+        typer.Option(help="Set it live even if clips are missing or damaged; the audit log records this."),
     ] = False,
 ) -> None:
     """Open or close a study. Before it is live, each of its clips is decoded.
@@ -286,7 +286,7 @@ def show_secret(
         str | None, typer.Option(help="Label of a link with its own recruiter; the study's by default.")
     ] = None,
 ) -> None:
-    """Print the secret that signs recruiters' addresses, and how to sign one; the audit log notes it.
+    """Print the secret that signs recruiters' URLs, and how to sign one; the audit log records this.
 
     Example: server link secret exp3 --link "summer school"
     """

@@ -141,7 +141,7 @@ def blinks(
         Path | None, typer.Option(help="The recording as an animation curve, including downward gaze.")
     ] = None,
     curve_format: Annotated[
-        str, typer.Option(help="Format of --curve, as of 'stimuli model export --format'.")
+        str, typer.Option(help="Format of --curve, as for 'stimuli model export --format'.")
     ] = "csv",
     plot: Annotated[
         Path | None, typer.Option(help="Figure of the series with its blinks (PNG, SVG, PDF).")
@@ -300,7 +300,7 @@ def sample(
     pca: PcaOption = False,
     plot: Annotated[Path | None, typer.Option(help="Figure of the new blinks.")] = None,
 ) -> None:
-    """Make new blinks that close as recorded ones do, or by the PCA model (--pca, --model).
+    """Make new blinks that move like recorded ones, or sample the PCA model (--pca, --model).
 
     Example: stimuli model sample --count 20 --duration 9 --seed 1 --out new.csv
     """

@@ -159,7 +159,7 @@ def verify_command(
     folder: Annotated[Path, typer.Argument(help="Folder with manifest.json.", show_default=False)],
     characters: Annotated[Path | None, typer.Option(help="Folder with your own characters.")] = None,
     levels: Annotated[
-        bool, typer.Option("--levels", help="List how well each feature of the clips distinguishes levels.")
+        bool, typer.Option("--levels", help="Show how well each feature of the clips identifies the levels.")
     ] = False,
 ) -> None:
     """Check built clips."""
@@ -349,8 +349,8 @@ def _looking_into(total: int) -> Iterator[Callable[[int], None]]:
 SITI_HELP = """
 Measure how much detail (SI) and motion (TI) videos have, by ITU-T P.910.
 
-Sources of a quality study should cover a range of both. Values are of 8-bit luminance; of several frames the
-largest counts.
+Sources of a quality study should cover a range of both. Values are for 8-bit luminance; the largest value of
+all frames counts.
 
 Examples:
 
@@ -400,7 +400,7 @@ def siti_command(
 STRIPS_HELP = """
 Write picture strips of the shipped characters at 33 closures, for the dashboard's blinks page.
 
-`make run` does this. After a character was baked again, update them with `make run` or this command.
+`make run` does this. After baking a character again, update them with `make run` or this command.
 
 Examples:
 

@@ -64,15 +64,15 @@ def clip_command(
     blur: Annotated[bool, typer.Option("--blur/--no-blur", help="Motion blur (MB) or none (NB).")] = True,
     lower_lid: Annotated[LowerLid, typer.Option(help="Lower-lid signals that move.")] = "none",
     brow_mm: Annotated[
-        float | None, typer.Option(help=("Distance in mm that the brows sink while the eye closes."))
+        float | None, typer.Option(help=("How far the brows move down while the eye closes, in mm."))
     ] = None,
-    cheek_mm: Annotated[float | None, typer.Option(help="Distance in mm that the cheeks rise.")] = None,
+    cheek_mm: Annotated[float | None, typer.Option(help="How far the cheeks rise, in mm.")] = None,
     squint_mm: Annotated[
         float | None,
-        typer.Option(help=("Distance in mm that the skin below the eye moves up and toward the nose.")),
+        typer.Option(help=("How far the skin below the eye moves up and toward the nose, in mm.")),
     ] = None,
     gaze_mm: Annotated[
-        float | None, typer.Option(help=("Distance in mm that the iris turns down under the lid."))
+        float | None, typer.Option(help=("How far the iris turns down under the lid, in mm."))
     ] = None,
     life: Annotated[
         float, typer.Option(min=0, max=1, help="Motion between blinks: 0 none, 1 as in recordings of people.")
@@ -81,13 +81,13 @@ def clip_command(
         float, typer.Option(min=0, max=1, help="How far the lids lift before the blink: 1 is 8%.")
     ] = 0.0,
     settle: Annotated[
-        float, typer.Option(min=0, max=1, help="How far they open beyond their rest after it: 1 is 8%.")
+        float, typer.Option(min=0, max=1, help="How far the lids open beyond rest after the blink: 1 is 8%.")
     ] = 0.0,
     eyes: Annotated[
         Eyes, typer.Option(help="One signal for both eyes, or the recorded left and right eye.")
     ] = "alike",
-    exemplar: Annotated[int, typer.Option(min=1, help="Number of the blink of that kind.")] = 1,
-    seed: Annotated[int, typer.Option(help="Random seed of all choices.")] = 2011,
+    exemplar: Annotated[int, typer.Option(min=1, help="Which blink of this profile, by number.")] = 1,
+    seed: Annotated[int, typer.Option(help="Random seed for all choices.")] = 2011,
     fps: Annotated[int, typer.Option(min=24, max=60, help="Frame rate.")] = 30,
     size: Annotated[str, typer.Option(help="Width x height in px, at most 1920x1200.")] = "960x360",
     clip_frames: Annotated[int | None, typer.Option(min=1, help="Length of the clip in frames.")] = None,

@@ -96,8 +96,8 @@ def track(
 ) -> None:
     """Track the eyelids in a recording with the coupled active appearance model.
 
-    Without labels a face detector finds the eyes and trains the model (its environment, 270 MB, is made at
-    first use); labels placed by hand (--labels) are more exact.
+    Without labels, a face detector finds the eyes and trains the model (its environment, 270 MB, is installed
+    on first use). Labels placed by hand (--labels) are more accurate.
 
     Writes one row per frame: frame, time_s, x01, y01 ... x18, y18, left_distance_px, right_distance_px (sides
     of the picture: left is the person's right eye, unless it is mirrored; with --one-eye 9 points and
@@ -119,7 +119,7 @@ def track(
 
       stimuli track take2.mp4 --model actor1.npz --out track2.csv --plot track2.png
 
-      stimuli track recordings/ --out tracks/    # every video of a folder; what is there already is kept
+      stimuli track recordings/ --out tracks/    # every video in a folder; existing tracks are kept
     """
     from stimuli_builder.tracking.cli_track import TrackJob, run_track, track_folder
 
@@ -288,7 +288,7 @@ def iris(
 ) -> None:
     """Measure the irises in a tracked recording, and estimate the millimeters per pixel.
 
-    Middle and diameter of each iris in pixels, empty where the eye is shut or doubtful, or no edge is seen.
+    Center and diameter of each iris in pixels; empty if the eye is shut or doubtful, or no edge is visible.
 
     Example:
 

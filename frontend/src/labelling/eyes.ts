@@ -68,12 +68,12 @@ export function shapeOn({ centres, width }: EyePlaces, closed: number): Shape {
 /** What was found for a choice of the page, in a sentence, and where the first shape lies then. */
 export function noticeOf(known: EyesOfVideo, eyes: 1 | 2): string {
   const eyesFound = eyesFor(known, eyes);
-  const middle = "The first shape lies in the middle of the picture: drag it to its place.";
+  const middle = "The first shape is in the middle of the picture: drag it into place.";
   if (eyesFound !== null) {
     const many = eyesFound.blinks.length === 1 ? "a blink" : `${eyesFound.blinks.length} blinks`;
     return `${eyes === 2 ? "Two eyes" : "An eye"} found by ${many}; the first shape lies there, and the frames include blinks.`;
   }
-  if (known.problem !== null) return `Eyes could not be looked for (${known.problem}). ${middle}`;
-  if (known.one !== null) return `No two eyes that blink together were found, but one large one: is it a close-up? ${middle}`;
-  return `No eye${eyes === 2 ? "s" : ""} found by blinks. ${middle}`;
+  if (known.problem !== null) return `The search for eyes failed (${known.problem}). ${middle}`;
+  if (known.one !== null) return `No two eyes that blink together were found, only one large eye. Is this a close-up? ${middle}`;
+  return `No blinking eye${eyes === 2 ? "s were" : " was"} found. ${middle}`;
 }

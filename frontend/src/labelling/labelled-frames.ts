@@ -174,7 +174,7 @@ export async function openForLabelling(file: File, report: (progress: string) =>
   try {
     const candidates = candidateFrames(video.frameCount);
     const pictures = await video.smallPictures(candidates, (count) =>
-      report(`Looking for frames unlike one another: ${count} of ${candidates.length}`),
+      report(`Looking for varied frames: ${count} of ${candidates.length}`),
     );
     const thumbnails = pictures.map(thumbnailOf);
     const seconds = video.seconds / Math.max(1, candidates.length - 1);

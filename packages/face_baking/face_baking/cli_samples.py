@@ -31,8 +31,8 @@ def bake_samples(
 ) -> None:
     """Render labeled pictures: identities, gaze and head turn to 30 degrees, closures, frowns, light, rims.
 
-    Every picture has a line in labels.jsonl with the lids' edges, canthi, iris and what of it is visible. A
-    stopped run goes on where it was; a greater count adds to what is there.
+    Every picture has a line in labels.jsonl: lid edges, canthi, the iris and its visible part. A
+    stopped run continues where it was; a larger count adds pictures.
 
     Examples:
 

@@ -348,7 +348,7 @@ function TokensCard() {
         <Title order={2} size="h4">
           API tokens
         </Title>
-        <Text size="sm">For scripts: send it as “Authorization: Bearer …”. A token has your rights at most.</Text>
+        <Text size="sm">For scripts: send it as “Authorization: Bearer …”. A token never has more rights than you.</Text>
         {fresh !== null && (
           <Alert title="Your new token (shown only now)" color="yellow">
             <Code block className="wrap-anywhere">

@@ -189,7 +189,7 @@ export function OtherEditors({ study }: { study: string }) {
   );
   return (
     <Text size="sm" role="status">
-      {`Also has this page open: ${words.join("; ")}. Edits of both are kept when you save; where you both changed a field or moved a clip, you choose.`}
+      {`Also has this page open: ${words.join("; ")}. When you save, both edits are kept; where you both changed a field or moved a clip, you choose.`}
     </Text>
   );
 }

@@ -210,7 +210,7 @@ function Held({ filled, held, put, hold }: Hand & { filled: { slot: Slot; clip: 
     <Group gap="xs" align="end" role="group" aria-label="Move a clip">
       <Select
         label={`Move ${held.file} to`}
-        description="A clip that is there changes places with it."
+        description="If the cell has a clip already, the two swap places."
         placeholder="Choose a cell"
         searchable
         data={filled.map(({ slot, clip }) => ({ value: slot.name, label: clip === null ? `${slot.name} (empty)` : slot.name }))}

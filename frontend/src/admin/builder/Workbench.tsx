@@ -212,7 +212,7 @@ function Met({ meeting: { both, theirs, lostComments = [], clips }, version }: {
           </Text>
           <SegmentedControl
             size="xs"
-            aria-label={`What stays of ${placeOf(edit.path.split("."))}`}
+            aria-label={`Keep which version of ${placeOf(edit.path.split("."))}`}
             style={{ alignSelf: "flex-start" }}
             value={taken.includes(edit.path) ? "theirs" : "mine"}
             onChange={(whose) => choose(edit, whose)}

@@ -46,7 +46,7 @@ function BlinkCard({ review, blink }: { review: BlinkReview; blink: Blink }) {
           </Group>
         </form>
         <Button variant="default" onClick={() => review.restore(blink)} disabled={!moved}>
-          Start and end as labelled
+          Start and end as labeled
         </Button>
       </Group>
     </Card>

@@ -82,7 +82,7 @@ function RunActions({ study, summary, mayErase }: ActionsProps) {
     (confirm: string) => unwrap(api.POST("/api/admin/studies/{study}/runs/{run}/erase", { ...path, body: { confirm } })),
     {
       touches,
-      done: "The person's data were erased in all of their known visits. Existing reports still contain them; create those again.",
+      done: "The person's data were erased in all of their known visits. Existing reports still contain them: build the reports again.",
     },
   );
   return (

@@ -77,7 +77,7 @@ function Drill({ backups: { drill, drilled_elsewhere } }: { backups: Backups }) 
       {drill === null ? (
         <Text size="sm">
           {drilled_elsewhere
-            ? "None here: the backups are encrypted, and the private key is elsewhere. Run server drill --identity where it is."
+            ? "None here: the backups are encrypted, and the private key is elsewhere. Run server drill --identity on the machine with the key."
             : "None yet."}
         </Text>
       ) : drill.passed ? (

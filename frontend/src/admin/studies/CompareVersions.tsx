@@ -75,7 +75,7 @@ function verdict({ keys, clips_differing, pooled }: Schemas["Comparison"]): stri
   if (keys.length === 0 && clips_differing === 0)
     return pooled ? "No differences." : "Only the sizes of clips differ. Their answers are kept separate.";
   return pooled
-    ? "Both measure the same with the same clips. Their answers are pooled."
+    ? "Both measure the same thing with the same clips. Their answers are pooled."
     : "They differ in what they measure or in their clips. Their answers are kept separate.";
 }
 

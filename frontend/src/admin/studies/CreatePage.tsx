@@ -116,7 +116,7 @@ function FromDefinition({ name, onTaken }: { name: string; onTaken: (message: st
       {upload !== null && !upload.has_manifest && (
         <TextInput
           label="Pattern of the file names"
-          description="The zip holds no manifest.json, so the names say which levels each clip has."
+          description="The zip contains no manifest.json, so the levels of each clip are read from the file names."
           placeholder="{character}_{speed}_{exemplar}.mp4"
           value={pattern}
           onChange={(event) => setPattern(event.currentTarget.value)}

@@ -37,8 +37,8 @@ const scrolledTo = (element: HTMLElement | null) => element?.scrollIntoView({ bl
 const inWords = (levels: string[]) => `${levels.slice(0, 4).join(", ")}${levels.length > 4 ? " …" : ""}`;
 
 const WAYS: Readonly<Record<string, string>> = {
-  pattern: "The names say which clip is which: each part in braces is something that varies.",
-  grid: "Say what varies, then put each clip into its cell.",
+  pattern: "The file names show which clip is which: each part in braces is something that varies.",
+  grid: "Name what varies, then put each clip into its cell.",
   csv: "Paste a table with one row per clip.",
 };
 

@@ -119,7 +119,7 @@ async function walk(study: string, recruiter: Texts, opened: Window, say: (steps
     note(3, isRight, isRight ? words : `expected ${expected || "none"}, got ${way || "none"}`);
     now = 4;
     const isPreview = (await previews()) > before;
-    note(4, isPreview, isPreview ? "Its run is stored as a preview, which results leave out." : "Its run is not among the previews.");
+    note(4, isPreview, isPreview ? "Its run is stored as a preview and is not part of the results." : "Its run is not among the previews.");
   } catch (error) {
     note(now, false, error instanceof Error ? error.message : String(error));
   } finally {

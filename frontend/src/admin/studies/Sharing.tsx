@@ -49,7 +49,7 @@ export function Sharing({ summary }: { summary: Schemas["StudySummary"] }) {
                   title: "Action",
                   cell: (row) => (
                     <Button size="xs" variant="default" onClick={() => set.mutate({ account: row.account, rights: [] })}>
-                      Take back
+                      Revoke
                     </Button>
                   ),
                 },

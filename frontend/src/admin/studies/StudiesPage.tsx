@@ -24,7 +24,7 @@ export function StudiesPage() {
         )}
       </Group>
       {closed.map(({ name, title }) => (
-        <Alert key={name} color="yellow" title={`The studies of “${title}” are closed to you`}>
+        <Alert key={name} color="yellow" title={`The studies of “${title}” cannot be opened yet`}>
           It requires a second factor. Set one up under{" "}
           <Anchor component={Link} to="/account" underline="always">
             My account
