@@ -63,7 +63,8 @@ def run(
     """Serve participants and experimenters until stopped (Ctrl-C); running requests are finished first.
 
     Settings come from the environment, see docs/reference/settings.md. Behind an https proxy, set
-    PALPEBRA_PUBLIC_URL. Example: server run --host 0.0.0.0 --port 8000 --workers 2
+    PALPEBRA_PUBLIC_URL.
+    Example: server run --host 0.0.0.0 --port 8000 --workers 2
     """
     _check_free(host, port)
     # For this process and its workers; else they would take the URL of the start before.

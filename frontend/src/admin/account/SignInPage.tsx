@@ -76,7 +76,8 @@ function ByPassword({ known = "", then }: ByPasswordProps) {
     <>
       {session.data?.accounts_exist === false && (
         <Alert title="No account yet" mb="md">
-          Create the first account with the one-time link that the server printed when it started. Lost it? Run <code>server admin link</code>.
+          Create the first account with the one-time link that the server printed when it started. Lost it? Run{" "}
+          <code>server admin link</code>.
         </Alert>
       )}
       <EntryForm sending={signIn} button="Sign in">

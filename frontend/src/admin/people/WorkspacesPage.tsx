@@ -62,9 +62,9 @@ function Members({ workspace }: { workspace: string }) {
                 cell: (row) => (
                   <ConfirmButton
                     size="xs"
-                    label="Take out"
+                    label="Remove"
                     question={`${row.account} will no longer see the studies of this workspace. Rights on single studies stay.`}
-                    confirm="Take out"
+                    confirm="Remove"
                     onConfirm={() => remove.mutate(row.account)}
                   />
                 ),
