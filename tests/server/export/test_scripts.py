@@ -129,7 +129,36 @@ def test_the_python_script_takes_participants_before_pilots_before_simulations(
     assert "origin" not in alone.stderr
 
 
-@pytest.mark.parametrize("more", ["two_series", "three_origins"])
+@pytest.fixture(scope="module")
+def older_origins(answers: Path) -> Path:
+    """The answers as of participants, and other ones, by the columns in which older exports have the origin."""
+    mine = pd.read_csv(answers, dtype=str, keep_default_na=False).assign(phase="live", synthetic="0")
+    mine = mine.drop(columns=["run_origin", "data_series"], errors="ignore")
+    parts = [mine]
+    for phase, synthetic in (("pilot", "0"), ("live", "1")):
+        other = mine.assign(response="7", phase=phase, synthetic=synthetic)
+        who = f"{phase}{synthetic}"
+        parts.append(other.assign(participant=who + other["participant"], run=who + other["run"]))
+    file = answers.with_name("older-origins.csv")
+    pd.concat(parts).to_csv(file, index=False)
+    return file
+
+
+@pytest.mark.parametrize("empty_column", [False, True])
+def test_the_python_script_knows_the_origins_of_older_exports(
+    older_origins: Path, tmp_path: Path, empty_column: bool
+) -> None:
+    file, target = tmp_path / "older.csv", tmp_path / "script.py"
+    rows = pd.read_csv(older_origins, dtype=str, keep_default_na=False)
+    (rows.assign(run_origin="") if empty_column else rows).to_csv(file, index=False)
+    target.write_text(script(EXP3, "py", file.name), encoding="utf-8")
+    said = run([sys.executable, "-W", "error", str(target)])
+    assert "8 participants" in said
+    line = next(line for line in said.splitlines() if line.startswith("0  lower_lid"))
+    assert float(line.split()[4]) == pytest.approx(own_f(file), abs=5e-4)
+
+
+@pytest.mark.parametrize("more", ["two_series", "three_origins", "older_origins"])
 def test_the_r_script_takes_the_newest_series_and_participants_first(
     answers: Path, request: pytest.FixtureRequest, more: str
 ) -> None:
