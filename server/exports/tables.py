@@ -226,20 +226,31 @@ class Cell:
     factor_levels: FactorLevels
 
 
-def cells_of(experiment: Experiment, earlier: Sequence[Experiment] = ()) -> list[Cell]:
+def cells_of(
+    experiment: Experiment, earlier: Sequence[Experiment] = (), every: Sequence[Experiment] = ()
+) -> list[Cell]:
     """The columns of means, scale by scale, cells in declared order; then those of earlier versions alone.
 
     A cell of several versions has one column, whose range is that of all their scales.
+
+    Parameters
+    ----------
+    every : sequence of Experiment, optional
+        All versions of the study, newest first: by them each cell has the same name in every extract.
     """
+    names: dict[tuple[str, FactorLevels], str] = {}
     taken = {name.casefold() for name in _TAKEN}
-    cells = {(cell.scale, cell.factor_levels): cell for cell in _cells(experiment, taken)}
-    for version in earlier:
-        for cell in _cells(version, set(taken)) if scales_of(version) else ():
+    for version in every or (experiment, *earlier):
+        for cell in _cells(version) if scales_of(version) else ():
             key = (cell.scale, cell.factor_levels)
-            if key not in cells:
-                name = unlike(cell.column.name, taken)
-                cells[key] = replace(cell, column=replace(cell.column, name=name))
-            cells[key] = replace(cells[key], column=_of_both(cells[key].column, cell.column))
+            if key not in names:
+                names[key] = unlike(cell.column.name, taken)
+    cells: dict[tuple[str, FactorLevels], Cell] = {}
+    for version in (experiment, *earlier):
+        for cell in _cells(version) if version is experiment or scales_of(version) else ():
+            key = (cell.scale, cell.factor_levels)
+            known = cells.setdefault(key, replace(cell, column=replace(cell.column, name=names[key])))
+            cells[key] = replace(known, column=_of_both(known.column, cell.column))
     return list(cells.values())
 
 
@@ -249,7 +260,8 @@ def _of_both(one: Column, other: Column) -> Column:
     return replace(one, minimum=min(low), maximum=max(high))
 
 
-def _cells(experiment: Experiment, taken: set[str]) -> list[Cell]:
+def _cells(experiment: Experiment) -> list[Cell]:
+    """The cells of one version; names of their columns may collide."""
     scales = scales_of(experiment)
     if not scales:
         raise InputError(
@@ -264,7 +276,7 @@ def _cells(experiment: Experiment, taken: set[str]) -> list[Cell]:
     cells: list[Cell] = []
     for scale in scales:
         for levels in product(*rated):
-            name = unlike("_".join((scale.name, *(plain_name(one.name) for one in levels))), taken)
+            name = "_".join((scale.name, *(plain_name(one.name) for one in levels)))
             said = ", ".join(f"{f.label}: {one.label}" for f, one in zip(within, levels, strict=True))
             column = Column(
                 name, "number", _mean_of(scale, said), minimum=scale.minimum, maximum=scale.maximum
@@ -284,6 +296,7 @@ def wide_columns(
     forms: Sequence[FormColumn],
     old_order: bool = False,
     earlier: Sequence[Experiment] = (),
+    every: Sequence[Experiment] = (),
 ) -> list[Column]:
     """The run, its groups, its answers to forms, how many answers are averaged, and a column per cell."""
     of_forms = {one.column.name for one in forms}
@@ -302,7 +315,7 @@ def wide_columns(
     number = Column(
         "answers", "integer", "Number of answers in main trials that the means are based on.", minimum=0
     )
-    return [*kept, *between, number, *(cell.column for cell in cells_of(experiment, earlier))]
+    return [*kept, *between, number, *(cell.column for cell in cells_of(experiment, earlier, every))]
 
 
 def wide_rows(
@@ -546,7 +559,8 @@ def wide_table(session: Session, study: Study, extract: Extract) -> ExportTable:
     # Answers of another data series may lie in cells that the newest declaration no longer has.
     earlier = [definition_of(version) for version in repository.answered_versions(session, study, extract)]
     rows = check_whole(wide_rows(session, study, extract, newest, forms, earlier), number)
-    return ExportTable("wide", wide_columns(newest, forms, extract.old_order, earlier), rows, number)
+    columns = wide_columns(newest, forms, extract.old_order, earlier, definitions[::-1])
+    return ExportTable("wide", columns, rows, number)
 
 
 TABLES: dict[TableName, Callable[[Session, Study, Extract], ExportTable]] = {

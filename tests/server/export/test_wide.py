@@ -103,6 +103,35 @@ def test_a_factor_that_becomes_between_keeps_its_earlier_cells(
     assert second["speed"] in ("slow", "fast")
 
 
+def test_cells_that_are_spelled_alike_have_the_names_of_the_codebook_in_every_extract(
+    viewer: Admin, study: StudyInDatabase, participant: Participant, tmp_path: Path
+) -> None:
+    """Three versions with other factors and equal levels; nobody answered the second."""
+    participant.agree()
+    participant.rate_all()
+    pace, tempo = (SHORT.replace('"speed"', f'"{name}"') for name in ("pace", "tempo"))
+    changed, services = parse_experiment(pace), study.services
+    with services.database.write() as session:
+        stored = session.query(Study).one()
+        add_version(session, stored, pace, changed, make_clip_folder(changed, tmp_path / "pace"), None)
+    rate_in_next_version(study, participant, tempo.replace('label = "Speed"', 'label = "Tempo"'), tmp_path)
+    codebook = viewer.get("/studies/short/data/codebook.md").text
+    meanings = {
+        name: next(line for line in codebook.splitlines() if f"| {name} |" in line)
+        for name in (
+            "rating_a_slow",
+            "rating_a_slow_2",
+            "rating_a_slow_3",
+        )
+    }
+    assert "Tempo" in meanings["rating_a_slow"]
+    first, second = rows_of(viewer, "wide.csv")
+    assert {name for name in filled(first) if "a_slow" in name} == {"rating_a_slow_3"}
+    assert {name for name in filled(second) if "a_slow" in name} == {"rating_a_slow"}
+    [alone] = rows_of(viewer, "wide.csv?series=1")
+    assert filled(alone) == filled(first)
+
+
 def test_a_cell_of_two_scales_has_the_range_of_both() -> None:
     older, newer = (
         parse_experiment(SHORT.replace("[trial.scale]", f"[trial.scale]\nmaximum = {most}"))
