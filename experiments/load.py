@@ -195,10 +195,15 @@ def load_experiment(name_or_path: str, *, has_data: bool = False) -> Experiment:
     return parse_experiment(text, path.name, has_data=has_data)
 
 
+def is_shipped(name: str) -> bool:
+    """Whether `load_experiment` takes this as the name of a shipped experiment."""
+    return name.replace("_", "-") in (*SHIPPED, *DEMOS)
+
+
 def locate(name_or_path: str) -> Path:
     """Return the path of the TOML file for a shipped experiment or a path; InputError if neither exists."""
     stem = name_or_path.replace("_", "-")
-    if stem in (*SHIPPED, *DEMOS):
+    if is_shipped(name_or_path):
         return FOLDER / f"{stem}.toml"
     path = Path(name_or_path)
     if path.is_file():

@@ -19,6 +19,7 @@ from experiments.files import check_folder
 
 if TYPE_CHECKING:
     from analysis.read.pool import Pool
+    from analysis.read.study_answers import StudyAnswers
     from experiments.declaration.experiment import Experiment
     from experiments.load import UnknownExperimentError
 
@@ -131,6 +132,7 @@ def run(
     from analysis.read.reading import NoRatingsError
     from analysis.read.study_answers import load_csv, load_database, read_runs, stored_at
     from analysis.report.contents import held_against
+    from experiments.load import is_shipped
     from experiments.seal import read_clips_sha256, read_seal
 
     if database is not None and csv is not None:
@@ -145,11 +147,14 @@ def run(
         check_folder(folder)
     try:
         with progress_spinner("reading answers"):
-            answers = (
-                load_csv(csv, declared, reading, study)
-                if csv is not None
-                else load_database(database or stored_at(), declared, reading, study, report and sensitivity)
-            )
+            if csv is not None:
+                answers = load_csv(csv, declared, reading, study)
+            else:
+                url, whole = database or stored_at(), report and sensitivity
+                answers = load_database(url, declared, reading, study, whole)
+                if is_shipped(experiment) and (edited := _edited_definition(declared, answers, pool, url)):
+                    declared = edited
+                    answers = load_database(url, declared, reading, study, whole)
             contents = study_contents(declared, answers, pool, read_runs(runs) if runs else None, scale)
     except NoRatingsError as error:
         typer.echo(f"nothing to analyze: {error}", err=True)
@@ -162,6 +167,36 @@ def run(
     if report:
         save_report(contents, folder, more=sensitivity, with_r=verify_with_r)
     show(contents)
+
+
+def _edited_definition(
+    shipped: "Experiment", answers: "StudyAnswers", pool: "Pool", url: str
+) -> "Experiment | None":
+    """The definition of the newest version that these answers were given to, if it is not the shipped one."""
+    from analysis.read.database import stored_definition
+    from analysis.read.pool import DECLARATION, VERSION, pooled
+    from experiments.load import parse_experiment
+    from experiments.schema.canonical import definition_sha256
+
+    own = definition_sha256(shipped)
+    rows = pooled(answers.rows, pool, answers.source, own).rows
+    versions = rows[VERSION].astype(str).astype(float)
+    newest = rows[versions == versions.max()]
+    if newest.empty or {str(name) for name in newest[DECLARATION].unique()} <= {own, ""}:
+        return None
+    name, number = str(newest["study"].iloc[0]), int(versions.max())
+    toml = stored_definition(url, name, None, number)
+    if not toml:
+        raise InputError(
+            f"study '{name}' (version {number}) differs from the shipped {shipped.name}, and its definition "
+            "is not in the database; give its TOML file instead"
+        )
+    typer.echo(
+        f"Study '{name}' was edited: its own definition (version {number}) is used, not the shipped "
+        f"{shipped.name}.",
+        err=True,
+    )
+    return parse_experiment(toml, name, has_data=True)
 
 
 def _declared_experiment(

@@ -12,7 +12,8 @@ from analysis.cli import app
 from analysis.paper.printed import SHIPPED
 from experiments.command_line import run_command_line
 from experiments.errors import InputError
-from experiments.load import load_experiment, locate
+from experiments.load import load_experiment, locate, parse_experiment
+from experiments.schema.canonical import definition_sha256
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 from tests.analysis.study_database import make_database
 
@@ -174,6 +175,36 @@ def test_an_unknown_study_is_refused_with_what_to_download(monkeypatch, capsys, 
     assert f"or the path of a TOML file. {missing}; set PALPEBRA_DATA_FOLDER to the" in words
     assert "its Design tab that downloads the definition (motion.toml), and give the path of" in words
     assert words.endswith("With the CSV from its Data tab: analysis run motion.toml --csv FILE")
+
+
+def test_an_edited_shipped_study_is_analysed_by_its_own_definition(tmp_path, monkeypatch) -> None:
+    monkeypatch.delenv("DATABASE_URL", raising=False)
+    monkeypatch.setenv("PALPEBRA_DATA_FOLDER", str(tmp_path))
+    file = tmp_path / "palpebra.sqlite"
+    _store_exp3_as("exp3", file)
+    before = call("run", "exp3", "--no-report")
+    assert (before.exit_code, before.stderr) == (0, "")
+    text = locate("exp3").read_text("utf-8")
+    label = EXP3.factors[0].label
+    assert text.count(f'label = "{label}"') == 1
+    edited = text.replace(f'label = "{label}"', 'label = "Cover of the lid"')
+    with closing(sqlite3.connect(file)) as database, database:
+        values = (edited, definition_sha256(parse_experiment(edited)))
+        database.execute("UPDATE study_versions SET definition_toml = ?, definition_sha256 = ?", values)
+    after = call("run", "exp3", "--no-report")
+    assert after.exit_code == 0, after.output
+    said = "Study 'exp3' was edited: its own definition (version 1) is used, not the shipped exp3."
+    assert said in " ".join(after.stderr.split())
+    assert "Cover of the lid" in after.stdout
+    assert label not in after.stdout
+    assert "under a different declaration" not in " ".join(after.stdout.split())
+    # A file that is named is used as it is, and the report says that the data had another.
+    named = call("run", str(locate("exp3")), "--no-report")
+    assert "under a different declaration" in " ".join(named.stdout.split())
+    with closing(sqlite3.connect(file)) as database, database:
+        database.execute("UPDATE study_versions SET definition_toml = ''")
+    with pytest.raises(InputError, match="give its TOML file instead"):
+        call_raising("run", "exp3")
 
 
 def test_a_study_of_the_database_comes_before_a_file_of_its_name(tmp_path, monkeypatch) -> None:
