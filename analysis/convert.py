@@ -1,5 +1,6 @@
 """A CSV whose columns are declared as a typed table, and that table as SPSS or Parquet."""
 
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
@@ -62,7 +63,7 @@ def read_typed(path: Path, columns: Columns) -> pd.DataFrame:
 
 def _typed(cells: pd.Series, column: Column, path: Path) -> pd.Series:
     if column.type == "time":
-        return pd.to_datetime(cells.mask(cells == ""), format="ISO8601", utc=True).dt.tz_convert(None)
+        return pd.to_datetime(cells.mask(cells == ""), format="ISO8601", utc=True)
     if column.type == "text":
         return _named(cells, column)
     try:
@@ -127,6 +128,9 @@ def _coded(cells: pd.Series, column: Column) -> tuple[pd.Series, dict[Any, str]]
             for code, level in enumerate(cells.cat.categories, 1)
         }
         return (cells.cat.codes + 1).astype("float64").mask(cells.isna()), labels
+    if column.type == "time":
+        # SPSS has no time zones.
+        return cells.dt.tz_localize(None), {}
     if column.type in ("integer", "boolean", "number"):
         return cells, {float(value): label for value, label in column.labels}
     return cells, {}
@@ -152,4 +156,7 @@ def write_parquet(frame: pd.DataFrame, columns: Columns, target: Path) -> None:
     from fastparquet import write
 
     described = {column.name: column.description for column in columns}
-    write(str(target), frame, compression="GZIP", custom_metadata=described)
+    with warnings.catch_warnings():
+        # fastparquet takes the UTC times of a column with a time zone, and keeps the zone in the metadata.
+        warnings.filterwarnings("ignore", "Series.values returning", DeprecationWarning)
+        write(str(target), frame, compression="GZIP", custom_metadata=described)

@@ -72,7 +72,7 @@ def test_spss_has_codes_with_labels_and_real_numbers(files: Path) -> None:
         "grosse": 1,
         "saved_at": 1,
     }
-    assert frame["saved_at"][0] == pd.Timestamp("2026-11-22T01:02:03.5")
+    assert frame["saved_at"][0] == pd.Timestamp("2026-11-22T01:02:03.5")  # SPSS has no time zones
     assert about.variable_measure["speed"] == "nominal"
 
 
@@ -84,6 +84,7 @@ def test_parquet_keeps_types_levels_and_meanings(files: Path) -> None:
         frame = parquet.to_pandas()
         assert parquet.key_value_metadata["age"] == "Age | in years"
     assert frame["age"].tolist()[0] == 30
+    assert frame["saved_at"][0] == pd.Timestamp("2026-11-22T01:02:03.5Z")
     assert str(frame["effort"].dtype) == "int64"
     assert list(frame["speed"].cat.categories) == ["slow", "fast"]
     assert frame["größe"].tolist()[2] == -2
