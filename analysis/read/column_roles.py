@@ -181,7 +181,9 @@ def guess_roles(path: Path) -> TableGuess:
     command = _fitting_command(texts, numbers, roles)
     if command:
         needed, optional = OPTIONS[command]
-        roles = {name: role for name, role in roles.items() if role in (*needed, *optional)}
+        # The item stays in sight where there are ratings: mixed models of the same table take it.
+        taken = (*needed, *optional, *(("item",) if "rating" in needed else ()))
+        roles = {name: role for name, role in roles.items() if role in taken}
     columns = tuple(_described(name, texts[name], numbers[name], roles.get(name, "")) for name in texts)
     hint = "" if command else wide_hint(table.header)
     decisions = [*table.decisions, *([hint.removeprefix("; ")] if hint else [])]

@@ -85,6 +85,21 @@ def test_votes_on_many_clips_are_opinion_scores(tmp_path: Path) -> None:
     )
 
 
+def test_the_clips_of_a_factorial_design_are_items(tmp_path: Path) -> None:
+    """`anova` averages over them, but a mixed model of the same table takes them."""
+    rows = [
+        f"p{n},{speed},{speed}{k}.mp4,{(n + k) % 7}" for n in range(9) for speed in "ab" for k in range(5)
+    ]
+    found = guess(tmp_path, _long("participant,speed,stimulus,response", rows))
+    assert roles(found) == {
+        "participant": "participant",
+        "speed": "within",
+        "stimulus": "item",
+        "response": "rating",
+    }
+    assert "item" not in found.command_line("t.csv")
+
+
 def test_levels_and_yes_or_no_are_thresholds(tmp_path: Path) -> None:
     rows = [f"v{n % 3},{10 * (n % 7)},{'yes' if n % 7 > 3 else 'no'},{'lr'[n % 2]}" for n in range(84)]
     found = guess(tmp_path, _long("id,duration_ms,seen,eye", rows))
