@@ -18,6 +18,7 @@ from analysis.models.ordinal import MAXIMUM_CATEGORIES, fit_ordinal
 from analysis.models.random_part import fit_theta
 from analysis.models.reml import Term, criterion, cross_products
 from experiments.errors import InputError
+from table_files import counted
 
 # Conditions of a planned study by how far each further one lies from the first.
 
@@ -109,10 +110,13 @@ class MixedDesign:
         for clips, faces in self._combinations:
             cell = faces * (1 if self.crossed else self.conditions)
             if clips % cell or clips // cell < 1 or clips < 2:
+                conditions = [] if self.crossed else [f"{self.conditions} conditions"]
+                parts = [f"{faces} faces"] * (faces > 1) + conditions
+                if not parts:
+                    raise InputError(f"expected at least two clips, got {clips}")
                 raise InputError(
-                    f"{clips} clips cannot be divided evenly between {faces} "
-                    f"faces{'' if self.crossed else f' in {self.conditions} conditions'}; expected a "
-                    f"multiple of {max(cell, 2)}"
+                    f"{counted(clips, 'clip')} cannot be divided evenly between {' in '.join(parts)}; "
+                    f"expected a multiple of {max(cell, 2)}"
                 )
             if not self.faces and clips == cell:
                 raise InputError(confounded(clips))
@@ -263,8 +267,8 @@ class OrdinalDesign:
         refuse_no_difference(self.differences)
         if self.clips < 2 or (not self.crossed and self.clips % self.conditions):
             raise InputError(
-                f"{self.clips} clips cannot be divided evenly between {self.conditions} conditions; use a "
-                f"multiple of {self.conditions}, or add --crossed"
+                f"{counted(self.clips, 'clip')} cannot be divided evenly between {self.conditions} "
+                f"conditions; use a multiple of {self.conditions}, or add --crossed"
             )
         if not self.crossed and self.clips == self.conditions:
             raise InputError(confounded(self.clips))

@@ -68,7 +68,8 @@ describe("the chart of means", () => {
     expect(caption(means)).toBe(
       "N = 3. Small points: participants (2 shown). Large points: their means. Bars: 95% within-participant CI (Cousineau-Morey).",
     );
-    expect(caption([mean({ speed: "20" }, 4.25, null)])).toContain("No bars");
+    expect(caption([mean({ speed: "20" }, 4.25, null)])).toContain("No bars: an interval needs at least two participants.");
+    expect(caption([mean({ speed: "20" }, 4.25, 0)])).toContain("all participants differ by the same amount between conditions");
   });
 
   it("keeps the axis to the scale, and says that bars are cut at its ends", () => {

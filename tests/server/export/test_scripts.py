@@ -131,7 +131,7 @@ def test_the_python_script_takes_participants_before_pilots_before_simulations(
 
 @pytest.fixture(scope="module")
 def older_origins(answers: Path) -> Path:
-    """The answers as of participants, and other ones, by the columns in which older exports have the origin."""
+    """The answers as of participants, and others, by the columns that have the origin in older exports."""
     mine = pd.read_csv(answers, dtype=str, keep_default_na=False).assign(phase="live", synthetic="0")
     mine = mine.drop(columns=["run_origin", "data_series"], errors="ignore")
     parts = [mine]

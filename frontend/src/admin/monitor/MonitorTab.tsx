@@ -97,6 +97,10 @@ function Quality({ runs, of }: { runs: Schemas["MonitoredRun"][]; of: number }) 
         <Title order={2} size="h4">
           How trials went
         </Title>
+        <Text size="sm" c="dimmed">
+          All trials, also practice, attention questions and checks, each by its best presentation. Results counts every presentation of
+          main trials.
+        </Text>
         {of > runs.length && (
           <Text size="sm" c="dimmed">
             Of the latest {runs.length.toLocaleString()} runs; all {of.toLocaleString()} are under Participants and Results.

@@ -20,6 +20,9 @@ export function HowShown({ data }: { data: AnyResults }) {
         <Title order={2} size="h5">
           How clips were shown
         </Title>
+        <Text size="sm" c="dimmed">
+          Every presentation of main trials.
+        </Text>
         <Counts title="Verdicts" counts={data.playback.verdicts} said={words} />
         <Counts title="Reasons" counts={data.playback.rules} said={ruleWords} />
         <Counts title="Shown" counts={data.playback.methods} said={methodWords} />

@@ -136,9 +136,12 @@ function marginCaption({ means }: Schemas["Margin"], { minimum, maximum }: Resul
   const people = numbers.length > 1 ? `${String(numbers[0])} to ${String(numbers.at(-1))}` : String(numbers[0] ?? 0);
   const shown = Math.max(0, ...means.map((mean) => mean.people.length));
   const some = shown < (numbers.at(-1) ?? 0) ? ` (${String(shown)} shown)` : "";
-  const bars = means.some(({ low, high }) => low !== null && high !== null && low < high)
+  const known = means.flatMap(({ low, high }) => (low === null || high === null ? [] : [high - low]));
+  const bars = known.some((length) => length > 0)
     ? "Bars: 95% within-participant CI (Cousineau-Morey)."
-    : "No bars: an interval needs at least two participants with different answers.";
+    : known.length > 0
+      ? "No bars: the intervals have no length, since all participants differ by the same amount between conditions."
+      : "No bars: an interval needs at least two participants.";
   const isCut = means.some(({ low, high }) => (low ?? minimum) < minimum || (high ?? maximum) > maximum);
   const cut = isCut ? " Bars are cut at the ends of the scale; the CSV has the whole intervals." : "";
   return `N = ${people}. Small points: participants${some}. Large points: their means. ${bars}${cut}`;
