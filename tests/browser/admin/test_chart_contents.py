@@ -28,13 +28,14 @@ DRAWN = """(plot) => {
   const ink = (one, what) => own(one, what).toLowerCase();
   const box = (one) => {
     const { left, right, top, bottom } = one.getBoundingClientRect();
-    return { x: (left + right) / 2, y: (top + bottom) / 2, top, bottom };
+    return { x: (left + right) / 2, y: (top + bottom) / 2, top, bottom, width: right - left };
   };
   const inked = (query, what) => [...plot.querySelectorAll(query)]
     .filter((one) => palette.includes(ink(one, what)))
     .map((one) => ({ ...box(one), r: Number(one.getAttribute('r')) }));
   return {
     bars: inked('line', 'stroke'),
+    ends: inked('path', 'stroke').filter((one) => Math.abs(one.width - 14) < 1),
     points: inked('circle', 'fill'),
     texts: [...plot.querySelectorAll('text')].map((one) => ({ text: one.textContent, ...box(one) })),
   };
@@ -43,9 +44,10 @@ DRAWN = """(plot) => {
 
 @dataclass
 class Chart:
-    """Bars as (middle, half the length) and points by size, from left to right, in units of the axis."""
+    """Bars as (middle, half the length), their ends, and points by size, from left to right, in units of the axis."""
 
     bars: list[tuple[float, float]]
+    ends: list[float]
     points: dict[int, list[float]]
     texts: list[str]
 
@@ -61,6 +63,7 @@ def read_chart(plot: Locator) -> Chart:
         points[int(one["r"])].append(float(slope * one["y"] + offset))
     return Chart(
         [(slope * one["y"] + offset, abs(slope) * (one["bottom"] - one["top"]) / 2) for one in bars],
+        [float(slope * one["y"] + offset) for one in drawn["ends"]],
         points,
         [one["text"] for one in drawn["texts"]],
     )
@@ -123,6 +126,8 @@ def test_bars_and_points_are_those_computed_from_the_exported_csv(
     low, high = np.clip(means - halves, 1, 7), np.clip(means + halves, 1, 7)
     assert [middle for middle, _ in chart.bars] == pytest.approx(list((low + high) / 2), abs=2 * PIXEL)
     assert [half for _, half in chart.bars] == pytest.approx(list((high - low) / 2), abs=PIXEL)
+    # A bar shorter than its point shows by its ends, which are wider.
+    assert sorted(chart.ends) == pytest.approx(sorted([*low, *high]), abs=2 * PIXEL)
     if len(factors) == 1:
         assert chart.points[4] == pytest.approx(list(means), abs=2 * PIXEL)
         assert sorted(chart.points[2]) == pytest.approx(sorted(people.ravel()), abs=2 * PIXEL)

@@ -81,6 +81,14 @@ const JITTER = [0, -2, 2, -1, 1];
 /** Room of all conditions of a figure on a phone. */
 const CONDITIONS_PX = 240;
 
+/** The end of an error bar: wider than the point of a mean, which hides a bar that is shorter than itself. */
+const CAP = {
+  draw(context: CanvasPath) {
+    context.moveTo(-7, 0);
+    context.lineTo(7, 0);
+  },
+};
+
 /** The palette's color of a level. Plot would take levels named "blue" and "red", or "circle", for colors and symbols themselves. */
 const SHADE = { value: "colour", scale: true } as const;
 
@@ -103,6 +111,7 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
   const step = Math.min(22, CONDITIONS_PX / Math.max(1, domain.length * shades.length));
   const marks = shades.map((shade, row) => {
     const own = rows.filter(({ colour }) => colour === shade);
+    const bars = own.filter(({ low, high }) => low < high);
     const dx = (row - (shades.length - 1) / 2) * step;
     const ink = crossed ? { stroke: SHADE } : { stroke: BLUE };
     const fill = crossed ? { fill: SHADE, symbol: SHADE } : { fill: BLUE };
@@ -114,6 +123,7 @@ export function marginPlot(margin: Schemas["Margin"], { scale }: Results, factor
       ),
       ...(crossed ? [Plot.line(own, { x: "x", y: "mean", z: "colour", dx, ...ink, strokeOpacity: 0.6 })] : []),
       Plot.ruleX(own, { x: "x", y1: "low", y2: "high", dx, ...ink, strokeWidth: 1.5 }),
+      ...["low", "high"].map((end) => Plot.dot(bars, { x: "x", y: end, dx, ...ink, symbol: CAP, strokeWidth: 1.5 })),
       Plot.dot(own, { x: "x", y: "mean", dx, ...fill, r: 4, stroke: "white", strokeWidth: 0.7, tip: true }),
     ];
   });
