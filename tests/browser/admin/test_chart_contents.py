@@ -44,7 +44,7 @@ DRAWN = """(plot) => {
 
 @dataclass
 class Chart:
-    """Bars as (middle, half the length), their ends, and points by size, from left to right, in units of the axis."""
+    """Bars as (middle, half the length), bar ends, and points by size, left to right, in the axis's units."""
 
     bars: list[tuple[float, float]]
     ends: list[float]
