@@ -272,12 +272,12 @@ def measure_reflections() -> None:
 
 
 GENERATED = (
-    Recording(face="alder-face@3", width_px=720),
-    Recording(face="alder-face@3", width_px=480, fps=120, light=0.1, noise=2.5, seed=12, crf=20),
-    Recording(face="alder-face@3", width_px=900, fps=120, light=0.12, noise=2, seed=21, crf=20),
-    Recording(face="cedar-face@3", width_px=720, light=0.15, noise=2, seed=11, crf=18),
-    Recording(face="cedar-face@3", width_px=1080, light=0.05, noise=1.5, seed=18, crf=18),
-    Recording(face="cedar-face@3", width_px=600, fps=60, seconds=2.2, onsets=(0.3, 1.2), noise=3, seed=22),
+    Recording(face="alder-face@4", width_px=720),
+    Recording(face="alder-face@4", width_px=480, fps=120, light=0.1, noise=2.5, seed=12, crf=20),
+    Recording(face="alder-face@4", width_px=900, fps=120, light=0.12, noise=2, seed=21, crf=20),
+    Recording(face="cedar-face@4", width_px=720, light=0.15, noise=2, seed=11, crf=18),
+    Recording(face="cedar-face@4", width_px=1080, light=0.05, noise=1.5, seed=18, crf=18),
+    Recording(face="cedar-face@4", width_px=600, fps=60, seconds=2.2, onsets=(0.3, 1.2), noise=3, seed=22),
 )
 
 

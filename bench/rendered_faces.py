@@ -48,7 +48,7 @@ from stimuli_builder.tracking.labels import load_labels
 from stimuli_builder.tracking.shapes import Points, default_markers, inter_eyelid_distances, widths
 from stimuli_builder.video import Picture, frames, rgb
 
-FACES = ("alder@8", "birch@6", "cedar@4", "hazel@6", "alder-face@3", "cedar-face@3")
+FACES = ("alder@8", "birch@6", "cedar@4", "hazel@7", "alder-face@4", "cedar-face@4")
 NOISE = 0.015
 SEEN = ((0.0, 0.3), (0.3, 0.5), (0.5, 0.7), (0.7, 1.01))
 

@@ -64,14 +64,14 @@ class Look:
 
 
 LOOKS = (
-    Look("alder-face@3", False, (720, 900), 170, 2, 0.5, 18, 11),
-    Look("alder-face@3", False, (360, 450), 85, 4, 0.7, 26, 12),
-    Look("cedar-face@3", False, (720, 900), 170, 2, 0.5, 18, 13),
-    Look("cedar-face@3", False, (240, 300), 55, 4, 0.7, 26, 14),
+    Look("alder-face@4", False, (720, 900), 170, 2, 0.5, 18, 11),
+    Look("alder-face@4", False, (360, 450), 85, 4, 0.7, 26, 12),
+    Look("cedar-face@4", False, (720, 900), 170, 2, 0.5, 18, 13),
+    Look("cedar-face@4", False, (240, 300), 55, 4, 0.7, 26, 14),
     Look("alder@8", True, (640, 480), CLOSE_UP_PX, 3, 0.7, 20, 15),
     Look("birch@6", True, (640, 480), CLOSE_UP_PX, 3, 0.7, 26, 16),
     Look("cedar@4", True, (640, 480), CLOSE_UP_PX, 5, 1.0, 20, 17),
-    Look("hazel@6", True, (640, 480), CLOSE_UP_PX, 5, 0.7, 26, 18),
+    Look("hazel@7", True, (640, 480), CLOSE_UP_PX, 5, 0.7, 26, 18),
 )
 
 

@@ -392,7 +392,7 @@ SIZE = (960, 360)
 SHEET_CLOSURES = np.linspace(0.0, 1.0, 16)
 ENLARGED_CLOSURES, TIMES = (0.0, 0.33, 0.67, 1.0), 3
 TILE_PX = 480
-MOVED, LOWERED = "hazel@6", "alder@8"
+MOVED, LOWERED = "hazel@7", "alder@8"
 """Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: one face each, for its size."""
 FACES_IN_A_ROW = 6
 QUALITY = 80

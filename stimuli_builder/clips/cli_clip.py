@@ -26,7 +26,7 @@ Examples:
 
   stimuli clip --profile AL_ease --duration 9 --character cartoon --no-blur --out textbook.mp4
 
-  stimuli clip --character hazel@6 --brow-mm 0.25 --cheek-mm 0.3 --squint-mm 0.2 --gaze-mm 0.4 --out moved.mp4
+  stimuli clip --character hazel@7 --brow-mm 0.25 --cheek-mm 0.3 --squint-mm 0.2 --gaze-mm 0.4 --out moved.mp4
 
   stimuli clip --character alder@8 --life 1 --clip-frames 150 --out alive.mp4
 

@@ -11,7 +11,7 @@ from experiments.load import DefinitionError, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from tests.helpers.faces import DEMO, HEAD, PROFILES, faces
 
-SHOWN = {"alder": "alder@10", "birch": "birch@8", "cedar": "cedar@6", "hazel": "hazel@6"}
+SHOWN = {"alder": "alder@11", "birch": "birch@9", "cedar": "cedar@7", "hazel": "hazel@7"}
 LIST = f"character = {json.dumps(list(SHOWN.values()))}"
 
 

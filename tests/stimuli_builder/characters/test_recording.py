@@ -81,7 +81,7 @@ def test_the_tracker_confirms_every_opening(made: Made) -> None:
 
 
 def test_openings_without_labels_are_those_of_the_lids(tmp_path: Path) -> None:
-    recording = Recording(face="alder-face@3", width_px=480, fps=120, seconds=0.7, onsets=(0.1,))
+    recording = Recording(face="alder-face@4", width_px=480, fps=120, seconds=0.7, onsets=(0.1,))
     recording.write(tmp_path)
     baked = bake_recording(RecordingOrder(tmp_path / "person.mp4", tmp_path / "made"))
     recorded = [k for k, level in enumerate(baked.levels) if level.first == level.second]

@@ -355,7 +355,7 @@ def test_a_textured_cover_on_a_real_face_is_never_tracked(face, tmp_path, kind, 
 
 def test_a_face_that_keeps_its_eyes_shut_is_not_covered(detector, tmp_path):
     """Rendered lids that stay shut are read less steadily, in one of two eyes by more than the limit."""
-    atlas = load_atlas(SHIPPED / "alder-face@3")
+    atlas = load_atlas(SHIPPED / "alder-face@4")
     base, rng = linear_to_srgb(atlas.base_linear()), np.random.default_rng(4)
     pictures = []
     for closure in np.repeat([0.0, 0.5, 1.0, 1.0, 0.0], 10):

@@ -130,7 +130,7 @@ def test_a_picture_and_its_mirror_image_have_the_same_lids(mesh, shared_data):
         assert unmirrored_face(turned, picture.shape[1]).points == pytest.approx(seen.points, abs=1e-3)
 
 
-@pytest.mark.parametrize("name", ["alder-face@3", "cedar-face@3"])
+@pytest.mark.parametrize("name", ["alder-face@4", "cedar-face@4"])
 def test_a_face_that_fills_the_picture_is_seen(mesh, name):
     atlas = load_atlas(SHIPPED / name)
     picture = linear_to_srgb(atlas.base_linear())

@@ -138,12 +138,12 @@ def detector(monkeypatch):
 
 CLOSURES = np.concatenate([np.zeros(12), [0.3, 0.7], np.ones(20), [0.6, 0.2], np.zeros(12), np.ones(12)])
 EYES = ((0.243, 0.29), (0.755, 0.29))
-"""Middles of alder-face@3's eyes, as parts of the picture's width and height."""
+"""Middles of alder-face@4's eyes, as parts of the picture's width and height."""
 
 
 def face_pictures(add):
     """Grey pictures of a rendered face that shuts its eyes twice, with light added by `add`."""
-    atlas = load_atlas(SHIPPED / "alder-face@3")
+    atlas = load_atlas(SHIPPED / "alder-face@4")
     base, rng = linear_to_srgb(atlas.base_linear()), np.random.default_rng(4)
     for number, closure in enumerate(CLOSURES):
         base[atlas.crop] = atlas.level_srgb(int(np.abs(atlas.closures - closure).argmin()))
