@@ -114,9 +114,17 @@ class RecordingBake:
     limits: list[str]
 
     @property
-    def measured_by(self) -> str:
-        """What measured the openings, in words."""
-        return "the tracker" if self.labeled else "the motion of the lids"
+    def eyes(self) -> int:
+        """One or two."""
+        return int(self.frames.points.shape[1]) // EYE_POINTS
+
+    @property
+    def opening_error(self) -> str:
+        """How far openings are off, in words."""
+        if self.labeled:
+            return f"opening within {self.measured.worst_mm:.2f} mm by the tracker"
+        # The lids' own drift is much smaller, and would be taken for the error.
+        return f"opening up to {UNLABELED_MM[self.eyes]:g} mm off, as measured without labels"
 
 
 def bake_recording(order: RecordingOrder) -> RecordingBake:
@@ -135,8 +143,9 @@ def bake_recording(order: RecordingOrder) -> RecordingBake:
     path = order.track or _tracked(order, info)
     track = read_eye_track(path, info, order.one_eye)
     openings, refused = find_openings(track, info)
-    opening = _choose(order, info, track, openings, refused)
-    baked = _bake(order, info, track, opening, len(openings), sum(refused.values()))
+    opening, looks = _choose(order, info, track, openings, refused)
+    video_px_per_mm = _scale(order, track, looks, opening)
+    baked = _bake(order, info, track, opening, video_px_per_mm, len(openings), sum(refused.values()))
     provenance: dict[str, object] = {
         "command": "stimuli bake recording",
         "recording": order.video.name,
@@ -189,8 +198,8 @@ def _model_of(info: VideoInfo, track: EyeTrack) -> CoupledModel:
 
 def _choose(
     order: RecordingOrder, info: VideoInfo, track: EyeTrack, openings: list[Opening], refused: Counter[str]
-) -> Opening:
-    """The densest opening after which the eyes do not look away."""
+) -> tuple[Opening, dict[int, Picture]]:
+    """The densest opening after which the eyes do not look away, and gray pictures of some frames."""
     if not openings:
         reasons = "; ".join(f"{reason} ({number})" for reason, number in refused.most_common(3))
         raise InputError(
@@ -210,7 +219,7 @@ def _choose(
     seen = [gaze for gaze in gazes.values() if gaze is not None]
     for opening, gaze in gazes.items():
         if gaze is None or abs(gaze[0]) <= LOOKS_AWAY:
-            return opening
+            return opening, pictures
     # Only if every opening looks away; the message names the median.
     usual = np.median(seen, axis=0)
     raise InputError(
@@ -287,6 +296,7 @@ def _bake(
     info: VideoInfo,
     track: EyeTrack,
     opening: Opening,
+    video_px_per_mm: float,
     usable: int,
     refused: int,
 ) -> RecordingBake:
@@ -299,9 +309,7 @@ def _bake(
         pictures = read_selected(
             info, list(opening.frames), rgb, lambda now: progress.update(task, completed=now)
         )
-    gray = read_frames(info, [opening.opened])[opening.opened]
     # The region may be scaled down; openings in mm are measured in the video.
-    video_px_per_mm = _scale(order, track, gray, opening)
     region = region_of(track.points[opening.opened], info, video_px_per_mm)
     px_per_mm = video_px_per_mm * region.scale
     with step_progress("removing head motion", len(opening.frames) - 1) as advance:
@@ -318,6 +326,7 @@ def _bake(
         levels = build_levels(frames, crop, advance)
     if motion is None:
         model = _model_of(info, track)
+        gray = read_frames(info, [opening.opened])[opening.opened]
         with step_progress("measuring openings", len(levels)) as advance:
             seen = tracked_openings(model, frames, levels, crop, gray, advance)
         measured = measure_levels(levels, seen, video_px_per_mm)
@@ -356,13 +365,15 @@ def _earlier(track: EyeTrack, shut: int, most: int) -> int:
     return first + int(lost[-1]) + 1 if len(lost) else first
 
 
-def _scale(order: RecordingOrder, track: EyeTrack, gray: NDArray[np.uint8], opening: Opening) -> float:
+def _scale(
+    order: RecordingOrder, track: EyeTrack, pictures: Mapping[int, Picture], opening: Opening
+) -> float:
     """Pixels of the video per mm: by the distance between the eyes, or by the iris of one."""
     eyes = track.eye_points(opening.opened)
     if track.eyes == 2:
         return float(np.hypot(*(eyes[1].mean(0) - eyes[0].mean(0)))) / order.eye_distance_mm
     # Irises vary least between people (11.7 mm, SD 0.5); the width of an eye is the second best.
-    return iris_scale(gray, track, opening.opened) or track.width_px / FISSURE_MM
+    return iris_scale(pictures, track) or track.width_px / FISSURE_MM
 
 
 # Limits: what the recording did not give, and what to record again.
@@ -376,6 +387,9 @@ ROUGH_DB = 33.0
 REFLECTION_MM2 = 0.3
 BRIGHT_CODE = 235
 SMALL_EYE_PX = 150
+UNLABELED_MM, UNLABELED_OPEN_MM = {1: 1.2, 2: 0.5}, {1: 2.6, 2: 0.7}
+"""Largest errors of openings without labels, and of the widest one, by the number of eyes
+(docs/explanation/tracking-accuracy.md)."""
 
 
 def limits_of(baked: RecordingBake, track: EyeTrack) -> Iterator[str]:
@@ -406,8 +420,9 @@ def _limits_of_recording(baked: RecordingBake, track: EyeTrack) -> Iterator[str]
     frames = baked.frames
     if not baked.labeled:
         yield (
-            "Openings were measured without labels. In rendered recordings of known truth they were up to "
-            "0.5 mm off, and the widest opening up to 0.7 mm. For more, give a track from labels of your own "
+            "Openings were measured without labels. In recordings of known truth they were up to "
+            f"{UNLABELED_MM[baked.eyes]:g} mm off, and the widest opening up to "
+            f"{UNLABELED_OPEN_MM[baked.eyes]:g} mm. For more, give a track from labels of your own "
             "(docs/how-to/label-frames.md)."
         )
     elif (floor := float((track.shut_px / track.open_px).max())) > FLOOR_SHARE:
@@ -589,8 +604,7 @@ def summary_lines(baked: RecordingBake, order: RecordingOrder) -> Sequence[str]:
     return [
         f"{order.out}: {len(baked.levels)} levels, {len(baked.frames.numbers)} of them recorded and "
         f"{between} interpolated; {counted(baked.usable, 'usable blink')} of {baked.blinks}",
-        f"left-out frames: median {np.median(known):.1f} dB{least}; opening within "
-        f"{baked.measured.worst_mm:.2f} mm by {baked.measured_by}",
+        f"left-out frames: median {np.median(known):.1f} dB{least}; {baked.opening_error}",
         *(f"limit: {limit}" for limit in baked.limits),
         f"{order.out / REPORT_NAME}: what is recorded, what is interpolated and how well",
     ]
