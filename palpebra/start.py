@@ -201,9 +201,11 @@ def only_server_of(place: Path) -> Iterator[None]:
 
 def _call_when_ready(port: int, action: Callable[[], None]) -> None:
     """Wait until the server answers. Links that are printed earlier lead to an error page."""
+    # Without the proxy of the environment, which cannot reach this machine's own server.
+    direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     while True:
         try:
-            urllib.request.urlopen(f"http://127.0.0.1:{port}/healthz", timeout=2).close()
+            direct.open(f"http://127.0.0.1:{port}/healthz", timeout=2).close()
         except (urllib.error.URLError, OSError):
             time.sleep(0.2)
             continue
