@@ -29,7 +29,7 @@ def test_space_goes_on_after_presses_of_the_mouse(server: ServerProcess, tmp_pat
     page.wait_for_selector("text=Practice is complete")
     page.keyboard.press(" ")
     visit.trials()
-    expect(page.get_by_role("button", name="That was not me, start from the beginning")).to_be_visible()
-    page.get_by_role("button", name="That was not me, start from the beginning").click()
+    expect(page.get_by_role("button", name="Start as another person")).to_be_visible()
+    page.get_by_role("button", name="Start as another person").click()
     page.wait_for_selector("text=About")
     assert visit.problems == []

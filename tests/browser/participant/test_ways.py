@@ -86,7 +86,7 @@ def test_another_person_starts_over_where_somebody_has_begun(
     second.wait_for_selector("text=Someone has started this study on this device")
     assert axe_violations(second) == []
     before = len(server.rows("SELECT id FROM study_runs"))
-    second.click("text=That was not me, start from the beginning")
+    second.click("text=Start as another person")
     visit.begin()
     assert len(server.rows("SELECT id FROM study_runs")) == before + 1
 
