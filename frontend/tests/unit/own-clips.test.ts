@@ -23,7 +23,7 @@ import { sizeRemark } from "../../src/admin/clips/UploadClips";
 import { languageFindings, ranked, summaryOf } from "../../src/admin/studies/Preflight";
 import { matching } from "../../src/admin/studies/StudiesPage";
 import { expectedReturn, isReturn, testAddress } from "../../src/admin/studies/SelfTest";
-import { nextStep, turnedAwayHere } from "../../src/admin/studies/StatusBadge";
+import { nextStep, stepOf, turnedAwayHere } from "../../src/admin/studies/StatusBadge";
 import {
   declaredPattern,
   factorsOfTable,
@@ -305,6 +305,8 @@ describe("the next step of a study", () => {
     expect(nextStep({ ...study, status: "live", quota: 20 }, []).text).toBe("Follow the participants on the monitor (3 of 20 complete).");
     expect(nextStep({ ...study, status: "live", paused: true }, []).page).toBe("/settings");
     expect(nextStep({ ...study, status: "closed" }, [])).toMatchObject({ step: "live", page: "/data" });
+    // Also before the checklist has come: the last step is then called Closed.
+    expect([stepOf("draft"), stepOf("closed")]).toEqual(["draft", "live"]);
     expect(nextStep({ ...study, archived_at: "2026-01-01" }, []).page).toBe("/settings");
   });
 });

@@ -59,13 +59,16 @@ interface Next {
   page: "" | "/rehearsal" | "/results" | "/monitor" | "/settings" | "/data" | null;
 }
 
+/** The step of a study by its status alone, as far as it is known without the checklist. */
+export const stepOf = (status: Schemas["StudySummary"]["status"]): Next["step"] => (status === "closed" ? "live" : status);
+
 /** What to do next with a study, by its status and what its checklist says. */
 export function nextStep(
   summary: Pick<Schemas["StudySummary"], "status" | "paused" | "archived_at" | "complete" | "quota">,
   checks: readonly Schemas["LaunchCheck"][],
 ): Next {
   const { status, paused, archived_at, complete, quota } = summary;
-  const step = status === "closed" ? "live" : status;
+  const step = stepOf(status);
   if (archived_at !== null)
     return { step, text: "This study is in the archive. Restore it under Settings to change it.", page: "/settings" };
   if (status === "closed") return { step, text: "Build the report and download the data.", page: "/data" };
@@ -93,7 +96,7 @@ export function StudySteps({ summary }: { summary: Schemas["StudySummary"] }) {
   useQuery({ ...studyQuery(summary.name), refetchInterval: summary.status === "live" || summary.status === "pilot" ? FRESH_MS : false });
   const checks = useQuery(launchChecksQuery(summary.name)).data;
   const next = checks === undefined ? null : nextStep(summary, checks);
-  const now = STEPS.findIndex(([step]) => step === (next?.step ?? summary.status));
+  const now = STEPS.findIndex(([step]) => step === (next?.step ?? stepOf(summary.status)));
   return (
     <Group gap="md" justify="space-between" className="study-steps">
       <ol aria-label="Steps of the study">
