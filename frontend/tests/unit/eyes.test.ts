@@ -141,9 +141,9 @@ describe("what was found", () => {
   it("is said, with where the shape lies else", () => {
     expect(noticeOf(KNOWN, 2)).toContain("Two eyes found by a blink;");
     expect(noticeOf(KNOWN, 1)).toContain("An eye found by a blink;");
-    expect(noticeOf({ ...KNOWN, two: null, one: BLINKING }, 2)).toContain("is it a close-up?");
-    expect(noticeOf(NO_EYES, 2)).toMatch(/^No eyes found by blinks\..*middle of the picture/);
-    expect(noticeOf({ ...NO_EYES, problem: "no worker" }, 1)).toContain("could not be looked for (no worker)");
+    expect(noticeOf({ ...KNOWN, two: null, one: BLINKING }, 2)).toContain("Is this a close-up?");
+    expect(noticeOf(NO_EYES, 2)).toMatch(/^No blinking eyes were found\..*middle of the picture/);
+    expect(noticeOf({ ...NO_EYES, problem: "no worker" }, 1)).toContain("The search for eyes failed (no worker)");
     expect(eyesFor(KNOWN, 1)?.centres[0]).toEqual([[60, 50]]);
   });
   it("puts blinks among the frames chosen, even of a short recording", () => {

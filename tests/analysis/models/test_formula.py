@@ -233,7 +233,7 @@ def test_formulas_are_read_as_r_reads_them() -> None:
         ("rating ~ blur + (1 | clip) + (1 + blur | clip)", "has 2 intercepts by clip; write one"),
         (
             "rating ~ blur + (1 | participant) + (0 + blur | participant)",
-            "gives each level of a factor a separate variance. Write (0 + blur || participant)",
+            "gives each factor level a separate variance. Write (0 + blur || participant)",
         ),
         (
             "rating ~ blur + age + (1 | clip) + (0 + blur + age | clip)",
