@@ -17,6 +17,7 @@ from analysis.commands.output import (
     show_text,
 )
 from experiments.files import check_folder
+from table_files import counted
 
 if TYPE_CHECKING:
     from analysis.capsule import FileComparison
@@ -153,7 +154,7 @@ def verify(
         say("hashes")
         listed, folder = open_capsule(capsule, files)
         typer.echo(f"capsule of the study {listed.study}, made {listed.made}, sha256 {listed.sha256}")
-        typer.echo(f"{len(listed.files)} files, all as listed")
+        typer.echo(f"{counted(len(listed.files), 'file')}, all as listed")
         if not report:
             return
         from analysis.capsule import compare_reports, rebuild

@@ -115,7 +115,7 @@ def show(contents: "Contents") -> None:
             typer.echo(f"\n{part.title}")
         for table in part.tables:
             if table.folded:
-                folded = f"{table.title}: {len(table.rows)} rows; see the report or the JSON file"
+                folded = f"{table.title}: {counted(len(table.rows), 'row')}; see the report or the JSON file"
                 typer.echo("\n" + "\n".join(wrap(folded)))
             else:
                 typer.echo("\n" + as_text(table))

@@ -60,7 +60,7 @@ def convert(
     frame = read_typed(table, declared)
     with whole_file(out) as unfinished:
         (write_spss if out.suffix == ".sav" else write_parquet)(frame, declared, unfinished)
-    typer.echo(f"{out}: {len(frame)} rows, {len(declared)} columns")
+    typer.echo(f"{out}: {counted(len(frame), 'row')}, {counted(len(declared), 'column')}")
 
 
 # `analysis reshape`: a wide table made long.
@@ -108,7 +108,7 @@ def reshape(
         f"- {table.n_columns} columns became '{rating}'; unchanged columns: "
         f"{', '.join(table.beside) or 'none'}"
     )
-    typer.echo(f"written: {out} ({len(table.rows)} rows)")
+    typer.echo(f"written: {out} ({counted(len(table.rows), 'row')})")
 
 
 # `analysis columns`: what a table may be, and the command that fits it.

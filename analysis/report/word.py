@@ -26,6 +26,7 @@ from analysis.report.numbers import (
     unbroken,
     with_minus,
 )
+from table_files import counted
 
 if TYPE_CHECKING:
     from docx.document import Document
@@ -297,7 +298,7 @@ def _add_note(document: "Document", text: str) -> None:
 def _describe(grid: "Grid", table: Table) -> None:
     """Alternative text of a table: its title, and what its rows and columns are."""
     columns = ", ".join(name for name in table.header if name)
-    said = f"{len(table.rows)} rows; columns: {columns}."
+    said = f"{counted(len(table.rows), 'row')}; columns: {columns}."
     for name, value in (("tblCaption", _sayable(table.title)), ("tblDescription", _sayable(said))):
         _set_property(grid, name, value)
 

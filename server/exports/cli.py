@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.text import Text
 from sqlalchemy.exc import SQLAlchemyError
 
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from experiments.files import check_targets, whole_file, whole_text
 from server.accounts.audit import record
 from server.accounts.identity import OPERATOR
@@ -225,7 +225,8 @@ def capsule(
             out_file,
             lambda _, step: status.update(Text(f"capsule: {step}")),
         )
-    out.print(f"{out_file}: {out_file.stat().st_size:,} bytes, {len(made.files)} files, sha256 {made.sha256}")
+    files = counted(len(made.files), "file")
+    out.print(f"{out_file}: {out_file.stat().st_size:,} bytes, {files}, sha256 {made.sha256}")
     missing = [
         name for name, value in (("creators", about.creators), ("licence", about.licence)) if not value
     ]

@@ -102,7 +102,7 @@ def copy(
     """
 
     def told(name: str, content: Content) -> None:
-        out.print(f"{name}: {content.rows} rows, {content.sha256[:12]} in both")
+        out.print(f"{name}: {counted(content.rows, 'row')}, {content.sha256[:12]} in both")
 
     copied = copy_database(source, target, told)
     rows = sum(content.rows for content in copied.values())

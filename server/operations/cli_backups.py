@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from pyrage import x25519
 
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from server.cli_common import out, stored_services
 from server.context import open_services
 from server.core.settings import Settings
@@ -128,7 +128,7 @@ def backup(
 
 def _contents(described: backups.Description) -> str:
     rows = sum(table.rows for table in described.tables.values())
-    return f"{rows} rows, {len(described.clips)} clips"
+    return f"{counted(rows, 'row')}, {counted(len(described.clips), 'clip')}"
 
 
 def _back_up_to(to: str, recipient: str, name: str, *, with_clips: bool, keep: int) -> None:
@@ -299,8 +299,8 @@ def drill(
         out.print(f"{result.backup}: the drill failed: {result.said}")
         raise typer.Exit(1)
     out.print(
-        f"{result.backup} was restored completely: {result.rows} rows, {result.clips} clips of "
-        f"{result.backed_up_at}, in {result.seconds:.0f} s"
+        f"{result.backup} was restored completely: {counted(result.rows, 'row')}, "
+        f"{counted(result.clips, 'clip')} of {result.backed_up_at}, in {result.seconds:.0f} s"
     )
 
 

@@ -92,7 +92,9 @@ def _drill_finding(watched: WatchedBackups) -> Finding:
         advice = "make a new backup and run: server drill"
         return Finding("restore drill", "failed", f"{drill.backup}: {drill.said}", advice)
     return Finding(
-        "restore drill", "ok", f"{drill.backup} came back whole on {drill.at:%Y-%m-%d}, {drill.rows} rows"
+        "restore drill",
+        "ok",
+        f"{drill.backup} came back whole on {drill.at:%Y-%m-%d}, {counted(drill.rows, 'row')}",
     )
 
 

@@ -99,7 +99,7 @@ def restore(
         raise InputError(f"{path} cannot be read: {error.strerror or error}") from error
     _keep_key(settings, key)
     _take_over_ledger(settings, copied_ledger)
-    told(f"{len(described.clips)} clips, secret key")
+    told(f"{counted(len(described.clips), 'clip')}, secret key")
     _erase_again(database, settings, told, covered=covered)  # last: it must not be lost among tables
     return described
 
@@ -210,7 +210,7 @@ def _write_tables(
                 f"table {name}: expected {expected.rows} rows, but the file contains {written.rows} or "
                 f"different values; the backup is damaged, nothing was restored"
             )
-        told(f"{name}: {written.rows} rows")
+        told(f"{name}: {counted(written.rows, 'row')}")
 
 
 def _put_keys_back(connection: Connection, keys: _Keys, told: Callable[[str], None]) -> None:

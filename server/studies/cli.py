@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL
 from experiments.command_groups import command_group
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, counted, did_you_mean
 from experiments.load import locate
 from experiments.manifest import CheckClip, Clip, Manifest, read_manifest
 from experiments.schema.canonical import definition_sha256
@@ -102,7 +102,7 @@ def add(
             if version is None:
                 version = add_version(session, study, text, declared, manifest, None)
                 refuse_if_live(session, study, of_clips)
-                said = f"version {version.number}, {len(manifest.clips)} clips ({new} new)"
+                said = f"version {version.number}, {counted(len(manifest.clips), 'clip')} ({new} new)"
             out.print(f"study {study.name}: {said}")
             for note in notes_of(declared, manifest, version):
                 out.print(f"note: {note}", markup=False)

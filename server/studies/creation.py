@@ -11,7 +11,7 @@ from experiments import design
 from experiments.assignment.order import motion_checks_by_block
 from experiments.checks import CHECK_CELL
 from experiments.declaration.experiment import Experiment
-from experiments.errors import InputError, did_you_mean
+from experiments.errors import InputError, counted, did_you_mean
 from experiments.kinds import KINDS
 from experiments.load import DEMOS, SHIPPED, DefinitionError, Problem, line_of, locate, parse_experiment
 from experiments.manifest import (
@@ -133,7 +133,7 @@ def check_against_design(experiment: Experiment, manifest: Manifest) -> None:
     if extra := sorted(set(built) - declared):
         cell, exemplar = extra[0]
         raise InputError(
-            f"the manifest holds {len(extra)} clips that the definition does not declare, "
+            f"the manifest holds {counted(len(extra), 'clip')} that the definition does not declare, "
             f"the first is {cell}, exemplar {exemplar}; {_remedy(manifest)}"
         )
     if len(built) != len(declared):

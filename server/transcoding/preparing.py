@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from sqlalchemy.exc import SQLAlchemyError
 
+from experiments.errors import counted
 from experiments.manifest import CheckClip, Clip
 from server.core.errors import ApiError
 from server.core.locks import Locks, LockTaken
@@ -320,7 +321,7 @@ def _faults_of(expected: dict[str, str | float]) -> Iterator[tuple[str, str]]:
         return
     turned = video.rotation_deg in (90, 270)
     size = (video.height_px, video.width_px) if turned else (video.width_px, video.height_px)
-    got = f"{len(video.times_s)} frames of {size[0]} x {size[1]} pixels"
+    got = f"{counted(len(video.times_s), 'frame')} of {size[0]} x {size[1]} pixels"
     declared = f"{expected['frames']} frames of {expected['width_px']} x {expected['height_px']} pixels"
     if got != declared:
         yield "different", f"expected {declared}, got {got}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 
 if TYPE_CHECKING:
     from experiments.level_leaks import LevelLeak
@@ -263,8 +263,8 @@ def checks_command(
     size_mb = sum({clip.file: clip.bytes for clip in report.manifest.checks}.values()) / 1e6
     removed = f", {len(report.removed)} old ones removed" if report.removed else ""
     print(
-        f"{declared.name}: {len(report.manifest.checks)} clips of checks in {out} ({size_mb:.1f} MB); "
-        f"{report.built} built{removed}"
+        f"{declared.name}: {counted(len(report.manifest.checks), 'clip')} of checks in {out} "
+        f"({size_mb:.1f} MB); {report.built} built{removed}"
     )
 
 
@@ -327,7 +327,8 @@ def manifest_command(
         manifest, target = write_own_manifest(folder, placed, declared, out, fps, report)
     cells = len({clip.cell for clip in manifest.clips})
     converted = f", {len(manifest.sources)} converted" if manifest.sources else ""
-    print(f"{len(manifest.clips)} clips in {cells} cells{converted}; wrote {target / 'manifest.json'}")
+    clips = counted(len(manifest.clips), "clip")
+    print(f"{clips} in {cells} cells{converted}; wrote {target / 'manifest.json'}")
 
 
 @contextmanager

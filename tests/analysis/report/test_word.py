@@ -16,6 +16,7 @@ from analysis.report.formats import Table, widths_cm
 from analysis.report.numbers import note_pieces, pieces, unbroken
 from analysis.report.write import write_report
 from experiments.load import load_experiment
+from table_files import counted
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 
 EXP3 = load_experiment("exp3")
@@ -131,7 +132,7 @@ def test_captions_are_numbered_by_word_and_each_figure_and_table_has_alternative
         (caption,) = table._tbl.tblPr.iter(qn("w:tblCaption"))
         (said,) = table._tbl.tblPr.iter(qn("w:tblDescription"))
         assert caption.get(qn("w:val"))
-        assert f"{len(table.rows) - 1} rows" in said.get(qn("w:val"))
+        assert said.get(qn("w:val")).startswith(f"{counted(len(table.rows) - 1, 'row')}; columns: ")
 
 
 def test_notes_begin_as_such_and_are_under_what_they_are_of(report) -> None:
