@@ -235,7 +235,8 @@ def f_of_r(said: str) -> float:
 def test_a_script_says_that_there_is_nothing_to_analyse(name: str, tmp_path: Path) -> None:
     columns = "participant,run,run_status,kind,excluded,trial_index,play,scale,response,winner,counts,correct"
     (tmp_path / "data.csv").write_text(
-        f"{columns},verdict,rt\nP1,1,complete,practice,0,0,1,rating,3,left,0,1,good,700\n", encoding="utf-8"
+        f"{columns},verdict,rt,run_origin\nP1,1,complete,practice,0,0,1,rating,3,left,0,1,good,700,\n",
+        encoding="utf-8",
     )
     target = tmp_path / "script.py"
     target.write_text(script(declared(name), "py", "data.csv"), encoding="utf-8")
@@ -243,6 +244,7 @@ def test_a_script_says_that_there_is_nothing_to_analyse(name: str, tmp_path: Pat
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].endswith("data.csv: " + NOTHING_LEFT)
     assert "Traceback" not in done.stderr
+    assert "Warning" not in done.stderr  # the column of origins is empty: numbers, for pandas
     assert NOTHING_LEFT in script(declared(name), "R", "data.csv")
 
 
