@@ -321,10 +321,11 @@ def _faults_of(expected: dict[str, str | float]) -> Iterator[tuple[str, str]]:
         return
     turned = video.rotation_deg in (90, 270)
     size = (video.height_px, video.width_px) if turned else (video.width_px, video.height_px)
-    got = f"{counted(len(video.times_s), 'frame')} of {size[0]} x {size[1]} pixels"
-    declared = f"{expected['frames']} frames of {expected['width_px']} x {expected['height_px']} pixels"
+    got = (len(video.times_s), *size)
+    declared = tuple(int(expected[name]) for name in ("frames", "width_px", "height_px"))
     if got != declared:
-        yield "different", f"expected {declared}, got {got}"
+        wanted, found = (f"{counted(n, 'frame')} of {w} x {h} pixels" for n, w, h in (declared, got))
+        yield "different", f"expected {wanted}, got {found}"
     rate, shown = float(video.typical_rate), float(expected["fps"])
     if len(video.times_s) > 1 and abs(rate / shown - 1) > RATE_TOLERANCE:
         yield "other_rate", f"shown at {shown:.1f}, recorded at {rate:.1f} frames per second"

@@ -1,5 +1,6 @@
 """Nobody's videos keep another account's waiting: neither many, nor long ones, nor those made for it."""
 
+import hashlib
 import os
 import signal
 import struct
@@ -12,7 +13,9 @@ from typing import Any
 import av
 import pytest
 
+from experiments.errors import counted
 from server.transcoding import worker
+from server.transcoding.preparing import examine_clips
 from server.transcoding.records import RECORDS, mark, records_of, waiting_in
 from server.transcoding.worker import address_limit, started_at_most
 from tests.helpers.videos import write_video
@@ -37,6 +40,24 @@ def still(path: Path, size_px: tuple[int, int], frames: int, fps: int = 30) -> P
             container.mux(stream.encode(picture))
         container.mux(stream.encode(None))
     return path
+
+
+@pytest.mark.parametrize("frames", [1, 1200])
+def test_a_clip_of_one_or_a_thousand_frames_is_as_declared(tmp_path: Path, frames: int) -> None:
+    clip = still(tmp_path / "clip.mp4", (64, 64), frames)
+    sha256 = hashlib.sha256(clip.read_bytes()).hexdigest()
+    size = {"width_px": 64, "height_px": 64}
+    order: dict[str, str | float] = {
+        "path": str(clip),
+        "sha256": sha256,
+        "fps": 30.0,
+        "frames": frames,
+        **size,
+    }
+    fine, other = examine_clips([order, order | {"frames": 4}])
+    assert fine == []
+    seen = f"{counted(frames, 'frame')} of 64 x 64 pixels"
+    assert other == [("different", f"expected 4 frames of 64 x 64 pixels, got {seen}")]
 
 
 def gif(path: Path, frames: int, delay_cs: int) -> Path:
