@@ -73,15 +73,8 @@ def prepare(study: str, stamp_text: str, made: Mapping[str, bool]) -> None:
         flush=True,
     )
     call("stimuli", "build", study, "--out", str(folder), "--quiet-when-current")
-    call(
-        "server",
-        "study",
-        "add",
-        study,
-        "--clips",
-        str(folder),
-        *[] if study in made else ["--open", "--no-link"],
-    )
+    opened = [] if study in made else ["--open", "--no-link"]
+    call("server", "study", "add", study, "--clips", str(folder), *opened)
     stamp.write_text(stamp_text)
 
 
@@ -113,9 +106,8 @@ def main() -> None:
     build_docs_meanwhile()
     port = os.environ.get("PORT", "8000")
     os.environ["PALPEBRA_DATA_FOLDER"] = str(DATA)
-    os.environ.setdefault(
-        "PALPEBRA_LOG_FORMAT", "text"
-    )  # for people, also where the output is not a terminal
+    # For people, also where the output is not a terminal.
+    os.environ.setdefault("PALPEBRA_LOG_FORMAT", "text")
     os.environ.setdefault("PALPEBRA_PUBLIC_URL", f"http://localhost:{port}")  # links name it before the start
     call("server", "database", "upgrade")
     stamp_text, made = sources(), studies_made()

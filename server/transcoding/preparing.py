@@ -324,8 +324,11 @@ def _faults_of(expected: dict[str, str | float]) -> Iterator[tuple[str, str]]:
     got = (len(video.times_s), *size)
     declared = tuple(int(expected[name]) for name in ("frames", "width_px", "height_px"))
     if got != declared:
-        wanted, found = (f"{counted(n, 'frame')} of {w} x {h} pixels" for n, w, h in (declared, got))
-        yield "different", f"expected {wanted}, got {found}"
+        expected_text, got_text = (
+            f"{counted(frames, 'frame')} of {width} x {height} pixels"
+            for frames, width, height in (declared, got)
+        )
+        yield "different", f"expected {expected_text}, got {got_text}"
     rate, shown = float(video.typical_rate), float(expected["fps"])
     if len(video.times_s) > 1 and abs(rate / shown - 1) > RATE_TOLERANCE:
         yield "other_rate", f"shown at {shown:.1f}, recorded at {rate:.1f} frames per second"
