@@ -21,7 +21,7 @@ def declare(dashboard: Dashboard, table: str, secret_name: str) -> None:
 def shown(dashboard: Dashboard, button: Locator) -> str:
     """The secret that the dialog behind this button shows, once its example was found to be signed by it."""
     button.click()
-    dialog = dashboard.page.get_by_role("dialog", name="Signed addresses")
+    dialog = dashboard.page.get_by_role("dialog", name="Signed URLs")
     expect(dialog.get_by_text("In Python:")).to_be_visible()
     secret = dialog.locator("pre").first.inner_text().strip()
     signature = hmac.new(bytes.fromhex(secret), b"P-0001", hashlib.sha256).hexdigest()

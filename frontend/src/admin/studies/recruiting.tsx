@@ -40,7 +40,7 @@ export function SigningButton({ study, link }: SigningProps) {
       <Button variant="default" size={link ? "compact-xs" : "sm"} onClick={open}>
         Show signing secret
       </Button>
-      <Modal size="xl" opened={opened} onClose={close} title="Signed addresses" closeButtonProps={{ "aria-label": "Close" }}>
+      <Modal size="xl" opened={opened} onClose={close} title="Signed URLs" closeButtonProps={{ "aria-label": "Close" }}>
         {opened && <Signing study={study} link={link} />}
       </Modal>
     </>
@@ -76,7 +76,7 @@ function Signing({ study, link }: SigningProps) {
             {data.shell}
           </Code>
           <Text size="sm" c="dimmed">
-            Anyone with a signed address can continue that visit on any device. This access is recorded in the audit log.
+            Anyone with a signed URL can continue that visit on any device. This access is recorded in the audit log.
           </Text>
         </Stack>
       )}
