@@ -51,7 +51,14 @@ describe("the chart of means", () => {
       ["100 ms", 2.25],
       ["20 ms", 6.5],
     ]);
-    expect(dots.slice(3)).toEqual([
+    // The ends of the bars, which show where the point of the mean hides a short one.
+    expect(dots.slice(3, -2)).toEqual([
+      ["20 ms", 3.75],
+      ["100 ms", 2.375],
+      ["20 ms", 4.75],
+      ["100 ms", 2.625],
+    ]);
+    expect(dots.slice(-2)).toEqual([
       ["20 ms", 4.25],
       ["100 ms", 2.5],
     ]);
@@ -88,6 +95,7 @@ describe("the chart of means", () => {
   it("has bars without length where there is no interval", () => {
     const plot = marginPlot({ factors: ["speed"], means: [mean({ speed: "20" }, 4.25, null)] }, SCALE, FACTORS);
     expect(drawn(plot, "rule").map(({ y1, y2 }) => [y1, y2])).toEqual([[4.25, 4.25]]);
+    expect(drawn(plot, "dot").map(({ y }) => y)).toEqual([4.25]);
   });
 
   it("of two factors has a line for each level of the second, in its color", () => {
@@ -95,7 +103,11 @@ describe("the chart of means", () => {
       ["100", "20"].map((speed, column) => mean({ character, speed }, 2 + row + 0.5 * column, 0.25)),
     );
     const plot = marginPlot({ factors: ["character", "speed"], means: crossed }, SCALE, FACTORS);
-    expect(drawn(plot, "dot").map(({ x, y, fill }) => [x, y, fill])).toEqual([
+    const dots = drawn(plot, "dot");
+    const ends = dots.filter(({ fill }) => fill === undefined).map(({ y, stroke }) => [y, stroke]);
+    expect(ends.slice(0, 4)).toEqual([1.75, 2.75, 2.25, 3.25].map((y) => [y, "100 ms"]));
+    expect(ends).toHaveLength(8);
+    expect(dots.filter(({ fill }) => fill !== undefined).map(({ x, y, fill }) => [x, y, fill])).toEqual([
       ["Anna", 2, "100 ms"],
       ["Bert", 3, "100 ms"],
       ["Anna", 2.5, "20 ms"],
