@@ -72,7 +72,8 @@ def run(
         int | None,
         typer.Option(
             min=1,
-            help="Data series: the responses of all versions that measure the same. Default: the latest.",
+            help="Data series: the responses of all versions that measure the same. Default: the latest "
+            "one with responses to the definition given, else the latest.",
             show_default=False,
         ),
     ] = None,

@@ -325,10 +325,10 @@ def manifest_command(
     declared = load_experiment(experiment) if experiment else None
     with _looking_into(len(placed)) as report:
         manifest, target = write_own_manifest(folder, placed, declared, out, fps, report)
-    cells = len({clip.cell for clip in manifest.clips})
+    cells = counted(len({clip.cell for clip in manifest.clips}), "cell")
     converted = f", {len(manifest.sources)} converted" if manifest.sources else ""
     clips = counted(len(manifest.clips), "clip")
-    print(f"{clips} in {cells} cells{converted}; wrote {target / 'manifest.json'}")
+    print(f"{clips} in {cells}{converted}; wrote {target / 'manifest.json'}")
 
 
 @contextmanager
