@@ -91,6 +91,24 @@ def test_a_phone_goes_through_everything_by_tapping(
     assert measured["viewing_distance_mm"] == 600
 
 
+def test_a_clip_wider_than_a_phone_fits_it_and_widens_no_page(
+    server: ServerProcess, tmp_path: Path, phone: BrowserContext
+) -> None:
+    narrow = without(PLAIN, ("minimum_width_px = 320", "minimum_width_px = 200"))
+    study = server.add_study(tmp_path / "clips", narrow)
+    server.start()
+    page = phone.new_page()
+    page.set_viewport_size({"width": 240, "height": 520})
+    Visit(page, server.address).open(study.link_token).begin()
+    while page.wait_for_selector(".ready, .prose, .page h1") and not page.query_selector(".ready"):
+        page.tap(".primary:enabled")
+        page.wait_for_timeout(300)
+    page.wait_for_timeout(300)  # the window may follow the page, and the clip the window
+    box = page.locator(".clip").evaluate("element => element.getBoundingClientRect().toJSON()")
+    sides = page.evaluate("[innerWidth, document.documentElement.scrollWidth]")
+    assert (box["left"], box["width"], sides) == (0, 240, [240, 240])
+
+
 def test_a_study_for_keyboards_turns_a_phone_away(
     server: ServerProcess, tmp_path: Path, phone: BrowserContext
 ) -> None:
