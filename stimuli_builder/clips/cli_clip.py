@@ -90,7 +90,9 @@ def clip_command(
     seed: Annotated[int, typer.Option(help="Random seed for all choices.")] = 2011,
     fps: Annotated[int, typer.Option(min=24, max=60, help="Frame rate.")] = 30,
     size: Annotated[str, typer.Option(help="Width x height in px, at most 1920x1200.")] = "960x360",
-    clip_frames: Annotated[int | None, typer.Option(min=1, help="Length of the clip in frames.")] = None,
+    clip_frames: Annotated[
+        int | None, typer.Option(min=1, max=5_000, help="Length of the clip in frames.")
+    ] = None,
     barcode: Annotated[bool, typer.Option("--test-barcode", help="Draw each frame's number.")] = False,
 ) -> None:
     """Render one clip."""

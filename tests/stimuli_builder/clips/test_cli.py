@@ -156,6 +156,7 @@ def test_a_clip_of_a_file_with_decimal_commas(
         (("--duration-ms", "nan"), "error: --duration-ms: expected a number, got nan"),
         (("--lower-lid", "both"), "has no lower-lid layer"),
         (("--clip-frames", 12), "longer than the clip of 12 frames"),
+        (("--clip-frames", 99999999), "--clip-frames: expected at most 5,000"),
         (("--duration", 9, "--duration-ms", 300), "error: expected --duration or --duration-ms, got both"),
         (("--profile", "espbm-left-01", "--eyes", "separate"), "shows one eye"),
     ],
