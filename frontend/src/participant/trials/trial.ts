@@ -140,6 +140,8 @@ export async function procedureFeedback(session: Session, stage: Stage, { trial,
   const key = procedureRemark(showings, rt_ms);
   const again = AGAIN.includes(key) && play <= run.playback.max_repeats;
   const text = t(key, { seconds: Math.round(rt_ms / 1000) }) + (again ? ` ${t("feedback_again")}` : "");
+  // What was there was about the answer that has been given.
+  stage.element.querySelector(".above")?.replaceChildren();
   stage.below.replaceChildren(h("h1", { class: "feedback" }, h("span", { role: "status" }, text)), footer);
   await choose(session, footer, [{ label: t(again ? "try_again" : "continue"), value: true }], "always");
   if (again) replays.add(trial, play + 1);
