@@ -141,6 +141,6 @@ def build_clips(database: Database, settings: Settings, public_id: str, experime
                 share = int(done) / max(1, int(total))
                 note(database, public_id, progress=share, message=f"{done} of {total} clips")
     if process.returncode or not (folder / MANIFEST_NAME).is_file():
-        reason = last_line("".join(lines)).removeprefix("error: ")
+        reason = last_line("".join(lines))
         raise InputError(reason or f"`stimuli build` ended with code {process.returncode}")
     note(database, public_id, status="done", progress=1.0, message="", finished_at=now())

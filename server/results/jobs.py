@@ -60,8 +60,9 @@ def own_program(name: str) -> Path:
 
 
 def last_line(printed: str) -> str:
-    """The last line that is not empty: a command line prints its error there."""
-    return next((line for line in reversed(printed.splitlines()) if line.strip()), "")
+    """The last line that is not empty, where a command line prints its error, without `error: `."""
+    line = next((line for line in reversed(printed.splitlines()) if line.strip()), "")
+    return line.removeprefix("error: ")
 
 
 # Work in the background that a row of `jobs` describes: reports, capsules and rehearsals.

@@ -190,7 +190,7 @@ def _run_analysis(arguments: Sequence[str], table: Path, name: str) -> None:
             said = f"The analysis did not end within {LIMIT_S} s. Run its command on your own computer"
             raise Invalid(f"{said}, where it may take longer.") from None
     if process.returncode != 0:
-        reason = last_line(printed).removeprefix("error: ") or "the analysis ended without a reason"
+        reason = last_line(printed) or "the analysis ended without a reason"
         raise Invalid(reason.replace(f"{table.parent}/", "").replace(table.name, name)[:500])
 
 

@@ -137,7 +137,8 @@ def _quartiles(values: "pd.Series[float]", digits: int = 0) -> str:
         return "-"
     # Quartiles: durations of blinks are skewed.
     low, middle, high = np.percentile(known, [25, 50, 75])
-    return f"{middle:.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
+    # The z writes a small negative number as 0, not as -0.
+    return f"{middle:z.{digits}f} ({low:z.{digits}f} to {high:z.{digits}f})"
 
 
 def _main_sequence(part: pd.DataFrame) -> str:

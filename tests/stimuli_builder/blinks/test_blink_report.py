@@ -29,6 +29,9 @@ def test_the_report_is_one_page_with_a_value_for_each_eye(labelled, tmp_path):
     page = (tmp_path / "r.html").read_text(encoding="utf-8")
     assert not re.search(r"""(?:src|href)=["']?(?:https?:)?//""", page)
     assert page.count("<svg") == 2
+    assert not re.search(
+        r"(?<![\d.])-0(?:\.0+)?(?![\d.])", re.sub(r"<svg.*?</svg>|<style.*?</style>", "", page, flags=re.S)
+    )
     cells = dict(re.findall(r'<th scope="row">([^<]+)</th><td>([^<]*)</td>', page))
     assert cells["blinks"] == "4"
     assert float(cells["blinks per minute"]) == pytest.approx(24, abs=0.2)

@@ -154,7 +154,7 @@ function Received({ upload, received }: { upload: Upload; received: Schemas["Upl
       </Group>
       {refused > 0 && (
         <Alert color="red" variant="light" title={`${counted(refused, "file")} cannot be used`}>
-          <Text size="sm">Correct them as described in the list below, then choose the corrected files there. The other files stay.</Text>
+          <Text size="sm">The list below says what to correct; choose the corrected files there. The other files stay.</Text>
         </Alert>
       )}
       {upload.plays === null && (
