@@ -325,7 +325,7 @@ def test_the_commands_write_table_text_figure_and_json(call, tmp_path, monkeypat
         ("mixed --difference 0.5 --clips 2", "2 clips are one per condition"),
         ("mixed --difference 0.5 --clips 5", "expected a multiple of 2"),
         ("mixed --difference 0.5 --faces 1", "at least two faces"),
-        ("mixed --difference 0.2,0.4 --clips 8", "in 3 conditions; expected a multiple of 3"),
+        ("mixed --difference 0.2,0.4 --clips 8", "between 3 conditions; expected a multiple of 3"),
         ("ordinal --difference 0.2,0.4 --shares 1,1 --clips 8", "between 3 conditions; use a multiple of 3"),
         ("mixed --difference ,", "power cannot be computed: no condition is compared; add --difference"),
         ("mixed --difference nan", "--difference should be numbers separated by commas, got 'nan'"),
