@@ -10,6 +10,15 @@ AXE = Path(__file__).resolve().parents[2] / "frontend" / "node_modules" / "axe-c
 WCAG = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa", "best-practice"]
 ANY_SCREEN = ".ready, .attention, .break, form, .code"
 Look = Callable[[str], None]
+UNSENT = """() => new Promise((resolve, reject) => {
+  const opening = indexedDB.open("palpebra");
+  opening.onerror = () => reject(opening.error);
+  opening.onsuccess = () => {
+    const reading = opening.result.transaction("outbox").objectStore("outbox").getAll();
+    reading.onsuccess = () => { opening.result.close(); resolve(reading.result); };
+  };
+})"""
+"""What the page has kept and not yet sent, in whatever order the browser keeps it."""
 
 
 class Visit:
@@ -138,6 +147,18 @@ def fit_card(page: Page, *widths: int) -> None:
         page.wait_for_selector(f".card-area[data-round='{number}']")
         page.fill(".card-area input", str(width))
         page.click("text=It fits")
+
+
+def wait_until_sent(page: Page) -> None:
+    """Back once the page has received and used the server's answer to everything it has sent.
+
+    A row in the database is not enough: the answer may still be on its way to the page.
+    """
+    for _ in range(300):
+        if not page.evaluate(UNSENT):
+            return
+        page.wait_for_timeout(100)
+    raise AssertionError("expected an empty outbox within 30 s")
 
 
 def _gone(element: ElementHandle | None) -> None:

@@ -10,7 +10,7 @@ from playwright.sync_api import Page
 from tests.browser.analysed import analysed
 from tests.browser.served import Served, go_back, reload_in_next_clip, serve, show_to_answers, start_clip
 from tests.browser.studies import PLAIN
-from tests.browser.visit import axe_violations
+from tests.browser.visit import axe_violations, wait_until_sent
 from tests.helpers.thresholds import FACTORS, TWO_INTERVAL, YES_NO
 
 pytestmark = pytest.mark.browser
@@ -63,7 +63,7 @@ def test_a_series_goes_on_without_connection_as_far_as_declared(studies: Served,
     page.wait_for_selector(".ready")
     assert axe_violations(page) == []
     studies.server.rows_soon("SELECT 1 AS one FROM series_answers WHERE threshold IS NOT NULL", 2)
-    page.wait_for_load_state("networkidle")
+    wait_until_sent(page)
     page.context.set_offline(True)
     for key in ("ArrowLeft", "n", "y", "2"):
         answer(page, key)

