@@ -71,7 +71,7 @@ def test_a_reload_without_a_server_goes_on_at_the_next_trial(
     assert [row["response"] for row in rows] == [4, 4, 2, 3, 3, 5]
     assert len({row["trial_index"] for row in rows}) == 6
     assert [row["status"] for row in server.rows("SELECT status FROM study_runs")] == ["complete"]
-    assert "loaded_without_server" in str(server.rows(EVENTS))
+    assert server.rows_soon(f"{EVENTS} WHERE data LIKE '%loaded_without_server%'", 1)
     assert page.evaluate("Object.keys(localStorage).filter(key => key.startsWith('palpebra visit'))") == []
 
 
