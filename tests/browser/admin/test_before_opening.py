@@ -81,8 +81,9 @@ def test_preview_and_definition_have_buttons_on_the_design_page(dashboard: Dashb
     not_tried = page.get_by_role("listitem").filter(has_text="not even as a preview")
     expect(not_tried.get_by_role("button", name="Preview as a participant")).to_be_visible()
     page.get_by_role("button", name="Definition (TOML)").click()
+    link = page.get_by_role("link", name="Download unfilled.toml")
     with page.expect_download() as saved:
-        page.get_by_role("link", name="Download unfilled.toml").click()
+        link.press("Enter")  # a mouse may miss it while the panel unfolds
     assert parse_experiment(saved.value.path().read_text(encoding="utf-8")).name == "unfilled"
 
 
