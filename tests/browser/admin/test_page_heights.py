@@ -17,8 +17,8 @@ pytestmark = pytest.mark.browser
 SCREEN = {"width": 1440, "height": 900}
 MOST_PX = 2 * SCREEN["height"]
 SHIPPED = sorted((REPOSITORY / "experiments").glob("*.toml"))
-STANDING_FOR_ALL = {"dcr-demo", "exp3", "plane-demo", "threshold-demo"}
-"""The longest pages; the other studies are measured in the long tests."""
+STANDING_FOR_ALL = {"exp3", "threshold-demo"}
+"""Among the longest pages; the other studies are measured in the long tests."""
 
 
 def lengths(page: Page, pages: str) -> dict[str, int]:

@@ -59,7 +59,7 @@ def add_read_back(page: Page) -> None:
     page.add_init_script(LISTEN)
 
 
-@pytest.mark.parametrize("load", ["idle", "busy"])
+@pytest.mark.parametrize("load", ["idle", pytest.param("busy", marks=pytest.mark.long)])
 def test_drawn_indices_equal_the_pixels_and_none_is_missing(
     server: ServerProcess, tmp_path: Path, page: Page, load: str
 ) -> None:
