@@ -15,7 +15,7 @@ help: ## list the targets
 run: setup ## set everything up and start Exp 1-3 in the browser (PORT=8000)
 	@$(BIN)/python tools/first_run.py
 
-PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n logical --maxprocesses 4 --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks
+PYTEST = OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --dist loadscope --no-loadscope-reorder --rerun-show-tracebacks
 test: setup-test ## set everything up and run the tests: Python, TypeScript, Chromium, a slice on PostgreSQL (tests/tiers.toml)
 	@cd frontend && npm run --silent test
 	@$(PYTEST) -m "not long" $(TESTS)

@@ -60,6 +60,9 @@ LONGEST_FILES = tuple(
     )
 )
 
+# More only wait for one another: each collects all tests and has a server and a browser of its own.
+MOST_PROCESSES = 4
+
 # The only tests that are run again when they fail, each with its reason.
 RERUNS = {
     test["name"]: test["reruns"]
@@ -86,6 +89,12 @@ class FileScheduling(LoadFileScheduling):  # type: ignore[misc]
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> FileScheduling:
     """For any number of processes."""
     return FileScheduling(config, log)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """For `-n auto`: one process more than processors, since tests in a browser wait half of their time."""
+    return min(MOST_PROCESSES, (os.cpu_count() or 1) + 1)
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
