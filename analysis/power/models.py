@@ -266,6 +266,8 @@ class OrdinalDesign:
             )
         refuse_no_difference(self.differences)
         if self.clips < 2 or (not self.crossed and self.clips % self.conditions):
+            if self.crossed:
+                raise InputError(f"expected at least 2 clips, got {self.clips}")
             raise InputError(
                 f"{counted(self.clips, 'clip')} cannot be divided evenly between {self.conditions} "
                 f"conditions; use a multiple of {self.conditions}, or add --crossed"

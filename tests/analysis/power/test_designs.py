@@ -111,6 +111,11 @@ def test_an_ordinal_design_that_cannot_be_is_refused(shares, clips, message) -> 
         OrdinalDesign((0.5,), shares, clips)
 
 
+def test_crossed_clips_are_not_asked_for_where_they_are_declared() -> None:
+    with pytest.raises(InputError, match=r"^expected at least 2 clips, got 1$"):
+        OrdinalDesign((0.5, 0.2), (1.0, 1.0), 1, crossed=True)
+
+
 def test_cells_correlate_as_asked(monkeypatch) -> None:
     drawn = []
     monkeypatch.setattr("analysis.power.factorial.linear_anova", lambda y, *_: drawn.append(y) or _Nothing())
