@@ -17,7 +17,8 @@ import pytest
 from analysis.pairs.abilities import fit_abilities
 from analysis.pairs.comparisons import read_comparisons
 from analysis.plans.clip_rating import READING, analyse_study
-from analysis.read.study_answers import load_csv, load_database
+from analysis.read.database import load_database
+from analysis.read.study_answers import load_csv
 from analysis.report.within_tables import all_tables
 from analysis.within.anova import within_anova
 from analysis.within.cell_means import cell_table

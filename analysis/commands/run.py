@@ -1,6 +1,8 @@
 """`analysis run`: a declared experiment, by the plan of its kind of trial."""
 
+from dataclasses import replace
 from enum import StrEnum
+from os import environ
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,7 +21,6 @@ from experiments.files import check_folder
 
 if TYPE_CHECKING:
     from analysis.read.pool import Pool
-    from analysis.read.study_answers import StudyAnswers
     from experiments.declaration.experiment import Experiment
     from experiments.load import UnknownExperimentError
 
@@ -131,7 +132,7 @@ def run(
     from analysis.read.pool import Origin as PoolOrigin
     from analysis.read.pool import Pool
     from analysis.read.reading import NoRatingsError
-    from analysis.read.study_answers import load_csv, load_database, read_runs, stored_at
+    from analysis.read.study_answers import load_csv, read_runs
     from analysis.report.contents import held_against
     from experiments.load import is_shipped
     from experiments.seal import read_clips_sha256, read_seal
@@ -141,21 +142,26 @@ def run(
     if verify_with_r and not report:
         raise InputError("--verify-with-r needs the report; remove --no-report")
     pool = Pool(PoolOrigin(origin.value) if origin else None, series, version)
-    declared, study = _declared_experiment(experiment, None if csv else database or stored_at(), study, pool)
-    reading = plan_of(declared.trial.kind).reading
+    url = None if csv else database or stored_at()
+    declared, study = _declared_experiment(experiment, url, study, pool)
     folder = out or Path("out") / "analysis" / declared.name
     if report:
         check_folder(folder)
     try:
         with progress_spinner("reading answers"):
             if csv is not None:
-                answers = load_csv(csv, declared, reading, study)
+                answers = load_csv(csv, declared, plan_of(declared.trial.kind).reading, study)
             else:
-                url, whole = database or stored_at(), report and sensitivity
-                answers = load_database(url, declared, reading, study, whole)
-                if is_shipped(experiment) and (edited := _edited_definition(declared, answers, pool, url)):
-                    declared = edited
-                    answers = load_database(url, declared, reading, study, whole)
+                # SQLAlchemy takes as long to import as numpy, and a CSV needs none of it
+                from analysis.read.database import load_database
+
+                url, said = database or stored_at(), None
+                if is_shipped(experiment):
+                    declared, said = _definition_in_use(declared, study, pool, url)
+                reading = plan_of(declared.trial.kind).reading
+                answers = load_database(url, declared, reading, study, report and sensitivity)
+                if said is not None:
+                    answers = replace(answers, decisions=(said, *answers.decisions))
             contents = study_contents(declared, answers, pool, read_runs(runs) if runs else None, scale)
     except NoRatingsError as error:
         typer.echo(f"nothing to analyze: {error}", err=True)
@@ -170,34 +176,50 @@ def run(
     show(contents)
 
 
-def _edited_definition(
-    shipped: "Experiment", answers: "StudyAnswers", pool: "Pool", url: str
-) -> "Experiment | None":
-    """The definition of the newest version that these answers were given to, if it is not the shipped one."""
-    from analysis.read.database import stored_definition
+def stored_at() -> str:
+    """DATABASE_URL, or the SQLite file in the server's data folder (PALPEBRA_DATA_FOLDER, else `data`)."""
+    if environ.get("DATABASE_URL"):
+        return environ["DATABASE_URL"]
+    folder = environ.get("PALPEBRA_DATA_FOLDER") or "data"
+    return f"sqlite:///{Path(folder) / 'palpebra.sqlite'}"
+
+
+def _definition_in_use(
+    shipped: "Experiment", study: str | None, pool: "Pool", url: str
+) -> tuple["Experiment", str | None]:
+    """The definition of the newest version that this pool's answers were given to, and a decision about it.
+
+    It may be of another kind of trial than the shipped one. Without a decision it is the shipped one.
+    """
+    from analysis.plans.plan import plan_of
+    from analysis.read.database import answered_versions, database_name, stored_definition
     from analysis.read.pool import DECLARATION, VERSION, pooled
     from experiments.load import parse_experiment
     from experiments.schema.canonical import definition_sha256
 
-    own = definition_sha256(shipped)
-    rows = pooled(answers.rows, pool, answers.source, own).rows
-    versions = rows[VERSION].astype(str).astype(float)
-    newest = rows[versions == versions.max()]
-    if newest.empty or {str(name) for name in newest[DECLARATION].unique()} <= {own, ""}:
-        return None
-    name, number = str(newest["study"].iloc[0]), int(versions.max())
+    own, reading = definition_sha256(shipped), plan_of(shipped.trial.kind).reading
+    answered = answered_versions(url, shipped, reading, study)
+    # Of several studies, none is chosen here: `load_database` says which there are.
+    if answered["study"].nunique() != 1:
+        return shipped, None
+    # The same choice as among the answers themselves, whose columns these are.
+    rows = pooled(answered, pool, database_name(url), own).rows
+    newest = rows[rows[VERSION] == rows[VERSION].max()]
+    if newest.empty or set(newest[DECLARATION]) <= {own, ""}:
+        return shipped, None
+    name, number = str(newest["study"].iloc[0]), int(newest[VERSION].iloc[0])
     toml = stored_definition(url, name, None, number)
     if not toml:
         raise InputError(
             f"study '{name}' (version {number}) differs from the shipped {shipped.name}, and its definition "
             "is not in the database; give its TOML file instead"
         )
-    typer.echo(
-        f"Study '{name}' was edited: its own definition (version {number}) is used, not the shipped "
-        f"{shipped.name}.",
-        err=True,
+    said = (
+        f"study '{name}' was edited: its own definition (version {number}) is used, not the shipped "
+        f"{shipped.name}"
     )
-    return parse_experiment(toml, name, has_data=True)
+    typer.echo(f"{said[:1].upper()}{said[1:]}.", err=True)
+    return parse_experiment(toml, name, has_data=True), said
 
 
 def _declared_experiment(

@@ -9,7 +9,7 @@ import pandas as pd
 
 from analysis.plans.exclusions import Exclusions, apply_exclusions
 from analysis.read.pool import Pool, origins, pooled
-from analysis.read.reading import NoRatingsError, Reading
+from analysis.read.reading import NoRatingsError, Reading, repeats_said
 from analysis.read.study_answers import RunEvidence, StudyAnswers, with_verdicts
 from analysis.report.contents import Contents
 from analysis.report.evidence import evidence_section
@@ -17,6 +17,7 @@ from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError, did_you_mean
 from experiments.kinds import scale_called
 from experiments.schema.canonical import definition_sha256
+from table_files import counted
 
 # What the data of a kind of trial can be asked: a file of its name here, with `PLAN`.
 #
@@ -111,7 +112,8 @@ def prepare(experiment: Experiment, plan: Plan, answers: StudyAnswers, pool: Poo
     plan.check(experiment, main, answers.source)
     if (main["participant"] == "").any():
         raise InputError(
-            f"{answers.source}: 'participant' is empty in {(main['participant'] == '').sum()} rows"
+            f"{answers.source}: 'participant' is empty in "
+            f"{counted(int((main['participant'] == '').sum()), 'row')}"
         )
     checked = replace(answers, rows=rows)
     exclusions = apply_exclusions(experiment, checked)
@@ -159,7 +161,7 @@ def _without_repeats(
             f"{source}: {where(rows, int(np.argmax(differ)))} occurs twice with different data; remove the "
             "wrong row"
         )
-    return rows[~again], (f"{again.sum()} repeated rows of the same trials were counted once",)
+    return rows[~again], (repeats_said(int(again.sum()), "the same trials"),)
 
 
 def _refuse_nobody(exclusions: Exclusions, answers: StudyAnswers, chosen: pd.DataFrame, pool: Pool) -> None:
@@ -199,9 +201,9 @@ def study_contents(
     if scale is not None:
         scale_called(experiment, scale)
     answers = with_verdicts(answers, runs) if runs else answers
-    contents = plan.analyse(replace(prepare(experiment, plan, answers, pool), scale=scale))
-    chosen = pooled(answers.rows, pool, answers.source, definition_sha256(experiment)).rows
-    evidence, numbers = evidence_section(chosen, runs, contents.synthetic)
+    prepared = prepare(experiment, plan, answers, pool)
+    contents = plan.analyse(replace(prepared, scale=scale))
+    evidence, numbers = evidence_section(prepared.checked.rows, runs, contents.synthetic)
     if evidence is None:
         return contents
     return replace(contents, evidence=evidence, numbers=contents.numbers | {"evidence": numbers})

@@ -1,4 +1,4 @@
-"""Rows of the SQL view of a kind of trial, read in portions straight into columns of codes."""
+"""A study's answers and definitions from the server's database; rows are read in portions into codes."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -7,19 +7,67 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from sqlalchemy import Connection, create_engine, inspect, text
+from sqlalchemy import Connection, bindparam, create_engine, inspect, text
 from sqlalchemy.engine import URL, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
+from analysis.read.pool import DECLARATION, SERIES, VERSION
 from analysis.read.reading import RUN_FLAGS, RUN_TEXTS, NoRatingsError, Reading
+from analysis.read.study_answers import StudyAnswers, of_one_study, took_part_again
 from analysis.read.text_table import categorical
+from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
 from experiments.files import with_driver
+from experiments.rules.exclusions import ScreensRaters
 from table_files import counted, nearest
 
 PORTION = 20_000
 KINDS = ("main", "attention")
 """Practice trials are never fetched: nobody analyses them."""
+_KINDS = ", ".join(f"'{kind}'" for kind in KINDS)
+
+
+# Decision 0723: `--version N` means the answers given under version N.
+def load_database(
+    url: str, experiment: Experiment, reading: Reading, study: str | None = None, whole: bool = False
+) -> StudyAnswers:
+    """Read the study's rows from the SQL view of its kind; `whole` adds what only slow parts need.
+
+    Raises
+    ------
+    NoRatingsError
+        No database there, no such view yet, or no row of this experiment.
+    InputError
+        A URL that cannot be used, or several studies and no `study` to choose one.
+    """
+    query = AnswersQuery(url, reading, experiment.name, study)
+    try:
+        # raters are compared clip by clip, exemplars apart
+        whole = whole or any(isinstance(rule, ScreensRaters) for rule in experiment.exclusions)
+        rows = query.rows(reading.further if whole else (), experiment.factor_names)
+        if rows.empty:
+            if study:
+                raise NoRatingsError(
+                    f"{query.name} has no ratings of experiment '{experiment.name}' in a study '{study}'; "
+                    "use this study's definition and its name as shown by `server study list`"
+                )
+            raise NoRatingsError(
+                f"experiment '{experiment.name}' has no ratings yet in {query.name}; practice does not count"
+            )
+        rows, chosen = of_one_study(rows, experiment.name, study, query.name)
+        # Asked for only where somebody has two runs, since it goes through the view once more.
+        return StudyAnswers(rows, query.name, chosen, query.first_seen() if took_part_again(rows) else {})
+    finally:
+        query.close()
+
+
+def answered_versions(url: str, experiment: Experiment, reading: Reading, study: str | None) -> pd.DataFrame:
+    """`AnswersQuery.versions` of this database; raises as `load_database`, but not where there is no row."""
+    query = AnswersQuery(url, reading, experiment.name, study)
+    try:
+        return query.versions()
+    finally:
+        query.close()
 
 
 class AnswersQuery:
@@ -27,7 +75,7 @@ class AnswersQuery:
 
     def __init__(self, url: str, reading: Reading, experiment: str, study: str | None) -> None:
         self._reading, self._view = reading, reading.view.name
-        self.name = _describe(url)
+        self.name = database_name(url)
         self._values = {"experiment": experiment, **({"study": study} if study else {})}
         self._where = "experiment = :experiment" + (" AND study = :study" if study else "")
         self._engine = create_engine(with_driver(url))
@@ -64,9 +112,8 @@ class AnswersQuery:
         names = [*texts, *numbers, *levels]
         codes = {name: _Codes() for name in (*texts, *levels)}
         values = {name: _Numbers() for name in numbers}
-        kinds = ", ".join(f"'{kind}'" for kind in KINDS)
         for portion in self._portions(
-            f"{', '.join(names)} FROM {self._view} WHERE {self._where} AND kind IN ({kinds})"
+            f"{', '.join(names)} FROM {self._view} WHERE {self._where} AND kind IN ({_KINDS})"
         ):
             for name, column in zip(names, zip(*portion, strict=True), strict=True):
                 (codes if name in codes else values)[name].add(column)
@@ -95,6 +142,32 @@ class AnswersQuery:
         for i, name in enumerate(flags, len(texts)):
             columns[name] = np.array([bool(row[i]) for row in of_category], dtype=bool)[taken]
         return columns
+
+    def versions(self) -> pd.DataFrame:
+        """Study, version, series, declaration and origin of the answers, of whatever kind of trial.
+
+        One row per combination, in columns of the same names as in the views.
+        """
+        # Per run and not per answer: a view would read every answer for these few rows.
+        query = text(
+            "SELECT DISTINCT s.name, v.number, v.series, v.definition_sha256, r.origin FROM study_runs r "
+            "JOIN study_versions v ON v.id = r.version_id JOIN studies s ON s.id = r.study_id "
+            "WHERE v.experiment = :experiment AND r.origin <> 'preview' AND r.erased_at IS NULL "
+            "AND EXISTS (SELECT 1 FROM trial_ratings t JOIN assigned_trials a "
+            "ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index "
+            "WHERE t.study_run_id = r.id AND a.kind IN :kinds)"
+        ).bindparams(bindparam("kinds", KINDS, expanding=True))
+        names, study = ("study", VERSION, SERIES, DECLARATION, "run_origin"), self._values.get("study")
+        try:
+            answered = self._connection.execute(query, {"experiment": self._values["experiment"]})
+            rows = [tuple(row) for row in answered if study in (None, row[0])]
+        except DBAPIError:
+            # Without row security a user may have rights on the view alone, which has answers of one kind.
+            self._connection.rollback()
+            counting = f"{self._where} AND kind IN ({_KINDS})"
+            portions = self._portions(f"DISTINCT {', '.join(names)} FROM {self._view} WHERE {counting}")
+            rows = [tuple(row) for portion in portions for row in portion]
+        return pd.DataFrame(rows, columns=list(names))
 
     def first_seen(self) -> dict[str, str]:
         """When the first row of each run was stored."""
@@ -167,7 +240,7 @@ def said_of_studies(url: str, name: str, others: Sequence[str]) -> tuple[str, bo
         hint = "set PALPEBRA_DATA_FOLDER to the server's data folder, or use --database"
         return f"There is no database at {file} to look for a study in; {hint}", False
     names = [str(row[0]) for row in _selected(url, "name FROM studies ORDER BY name", name)]
-    where = _describe(url)
+    where = database_name(url)
     if not names:
         return f"No studies were found in {where}", False
     near = nearest(name, [*names, *others], cutoff=0.6)
@@ -192,7 +265,7 @@ def _selected(url: str, selection: str, study: str) -> list[tuple[Any, ...]]:
     InputError
         A URL that cannot be used, a database without connection, or tables that cannot be read.
     """
-    name = _describe(url)
+    name = database_name(url)
     engine = create_engine(with_driver(url))
     if missing_file(engine.url):
         return []
@@ -254,8 +327,8 @@ def _factor_columns(levels: "pd.Categorical[str]", factors: Sequence[str]) -> di
     return columns
 
 
-def _describe(url: str) -> str:
-    """The database in words, without a password."""
+def database_name(url: str) -> str:
+    """The database in words, without a password; InputError for a URL that cannot be used."""
     try:
         parsed = make_url(with_driver(url))
         parsed.get_dialect()

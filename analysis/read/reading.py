@@ -71,8 +71,8 @@ class Reading:
 
 EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic")
 _COUNT = (
-    ("kind", ("main", ""), "practice and attention trials"),
-    ("verdict", ("good", "uncertain", "flagged", ""), "failed plays"),
+    ("kind", ("main", ""), "practice or attention trial"),
+    ("verdict", ("good", "uncertain", "flagged", ""), "failed play"),
 )
 
 
@@ -82,16 +82,17 @@ def rows_that_count(
     """Of the rows to `keep` (n,) those that count, and a sentence for each reason that leaves some out."""
     decisions = []
     bad = [
-        (~rows[column].astype(str).isin(good).to_numpy(), why)
-        for column, good, why in _COUNT
+        (~rows[column].astype(str).isin(good).to_numpy(), what)
+        for column, good, what in _COUNT
         if column in rows.columns
     ]
     if "excluded" in rows.columns:
-        bad.append((flags(rows["excluded"], source), "rows of runs excluded by hand"))
-    for marked, why in bad:
+        bad.append((flags(rows["excluded"], source), "row"))
+    for marked, what in bad:
         out = keep & marked
         if out.any():
-            decisions.append(f"{out.sum()} {why} excluded")
+            of = " of manually excluded runs" if what == "row" else ""
+            decisions.append(f"{counted(int(out.sum()), what)}{of} excluded")
         keep = keep & ~out
     return keep, decisions
 
@@ -140,6 +141,11 @@ def answers_that_count(
         raise InputError(f"{table.source}: there are no usable {what}; {', '.join(left_out)}")
     report_visits(table, keep)
     return keep
+
+
+def repeats_said(number: int, of: str) -> str:
+    """The decision about rows that repeat trials."""
+    return f"{counted(number, 'repeated row')} of {of} {'was' if number == 1 else 'were'} counted once"
 
 
 # Failures of the analysis that are nobody's fault.

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from os import environ
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,7 @@ from analysis.read.text_table import flags, read_text_table
 from experiments.columns.runs import EVIDENCE_COLUMNS
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
-from experiments.rules.exclusions import ScreensRaters
+from table_files import counted
 
 
 @dataclass(frozen=True)
@@ -60,53 +59,8 @@ def load_csv(path: Path, experiment: Experiment, reading: Reading, study: str | 
             rows[name] = flags(rows[name], path.name)
     seen = _first_seen(rows, path.name)
     rows = rows.drop(columns="saved_at", errors="ignore")
-    rows, chosen = _of_one_study(rows, experiment.name, study, path.name)
+    rows, chosen = of_one_study(rows, experiment.name, study, path.name)
     return StudyAnswers(rows, path.name, (*table.decisions, *chosen), seen)
-
-
-def stored_at() -> str:
-    """DATABASE_URL, or the SQLite file in the server's data folder (PALPEBRA_DATA_FOLDER, else `data`)."""
-    if environ.get("DATABASE_URL"):
-        return environ["DATABASE_URL"]
-    folder = environ.get("PALPEBRA_DATA_FOLDER") or "data"
-    return f"sqlite:///{Path(folder) / 'palpebra.sqlite'}"
-
-
-# Decision 0723: `--version N` means the answers given under version N.
-def load_database(
-    url: str, experiment: Experiment, reading: Reading, study: str | None = None, whole: bool = False
-) -> StudyAnswers:
-    """Read the study's rows from the SQL view of its kind; `whole` adds what only slow parts need.
-
-    Raises
-    ------
-    NoRatingsError
-        No database there, no such view yet, or no row of this experiment.
-    InputError
-        A URL that cannot be used, or several studies and no `study` to choose one.
-    """
-    # SQLAlchemy takes as long to import as numpy, and a CSV needs none of it
-    from analysis.read.database import AnswersQuery
-
-    query = AnswersQuery(url, reading, experiment.name, study)
-    try:
-        # raters are compared clip by clip, exemplars apart
-        whole = whole or any(isinstance(rule, ScreensRaters) for rule in experiment.exclusions)
-        rows = query.rows(reading.further if whole else (), experiment.factor_names)
-        if rows.empty:
-            if study:
-                raise NoRatingsError(
-                    f"{query.name} has no ratings of experiment '{experiment.name}' in a study '{study}'; "
-                    "use this study's definition and its name as shown by `server study list`"
-                )
-            raise NoRatingsError(
-                f"experiment '{experiment.name}' has no ratings yet in {query.name}; practice does not count"
-            )
-        rows, chosen = _of_one_study(rows, experiment.name, study, query.name)
-        # Asked for only where somebody has two runs, since it goes through the view once more.
-        return StudyAnswers(rows, query.name, chosen, query.first_seen() if _runs_again(rows) else {})
-    finally:
-        query.close()
 
 
 def _has_no_rows(path: Path) -> bool:
@@ -117,7 +71,7 @@ def _has_no_rows(path: Path) -> bool:
 
 
 def _first_seen(rows: pd.DataFrame, source: str) -> dict[str, str]:
-    if not {"run", "saved_at"} <= set(rows.columns) or not _runs_again(rows):
+    if not {"run", "saved_at"} <= set(rows.columns) or not took_part_again(rows):
         return {}
     words = rows["saved_at"].astype(str)
     words = words[~words.isin(MISSING_MARKS)]
@@ -131,15 +85,17 @@ def _first_seen(rows: pd.DataFrame, source: str) -> dict[str, str]:
     return {str(run): moment.isoformat() for run, moment in first.items()}
 
 
-def _runs_again(rows: pd.DataFrame) -> bool:
+def took_part_again(rows: pd.DataFrame) -> bool:
+    """Whether any participant has several runs."""
     if "run" not in rows.columns:
         return False
     return bool(rows.groupby("participant", observed=True)["run"].nunique().max() > 1)
 
 
-def _of_one_study(
+def of_one_study(
     rows: pd.DataFrame, experiment: str, study: str | None, source: str
 ) -> tuple[pd.DataFrame, tuple[str, ...]]:
+    """The rows of this experiment and study, and what was ignored; InputError where the study is unclear."""
     decisions: list[str] = []
     if "experiment" in rows.columns:
         rows = _only(rows, "experiment", experiment, source, decisions)
@@ -159,7 +115,9 @@ def _only(rows: pd.DataFrame, column: str, name: str, source: str, decisions: li
     if len(names) == 1:
         return rows
     mine = (rows[column] == name).to_numpy()
-    decisions.append(f"{(~mine).sum()} rows with other {column} values were ignored")
+    number = int((~mine).sum())
+    other = counted(number, "row")
+    decisions.append(f"{other} with other {column} values {'was' if number == 1 else 'were'} ignored")
     return rows[mine]
 
 

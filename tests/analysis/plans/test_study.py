@@ -8,9 +8,10 @@ import pytest
 from scipy import stats
 
 from analysis.plans.clip_rating import READING, analyse_study
+from analysis.read.database import load_database
 from analysis.read.pool import Origin, Pool
 from analysis.read.reading import NoRatingsError
-from analysis.read.study_answers import load_csv, load_database
+from analysis.read.study_answers import load_csv
 from analysis.report.json_output import as_data, left_out
 from experiments import rules
 from experiments.errors import InputError
@@ -248,7 +249,7 @@ def test_wrong_rows_are_refused_by_participant_and_trial(tmp_path, rows, values,
 
 def test_repeated_rows_count_once_and_contradictions_are_refused(tmp_path, rows) -> None:
     analysis = analyse(tmp_path, [*rows, rows[0]])
-    assert "1 repeated rows of the same trials were counted once" in analysis.decisions
+    assert "1 repeated row of the same trials was counted once" in analysis.decisions
     with pytest.raises(InputError, match="participant P00, trial 0 occurs twice"):
         analyse(
             tmp_path, [*rows, rows[0] | {"response": 8 - int(rows[0]["response"])}, rows[0] | {"response": 1}]

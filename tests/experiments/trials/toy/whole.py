@@ -29,7 +29,8 @@ analysis.plans.__path__.append(str(HERE / "plans"))
 from fastapi.testclient import TestClient  # noqa: E402
 
 from analysis.plans.plan import plan_of, study_contents  # noqa: E402
-from analysis.read.study_answers import load_csv, load_database  # noqa: E402
+from analysis.read.database import load_database  # noqa: E402
+from analysis.read.study_answers import load_csv  # noqa: E402
 from analysis.report.write import write_report  # noqa: E402
 from experiments.schema.stored import FORMAT, load_stored  # noqa: E402
 from server.accounts.identity import OPERATOR  # noqa: E402
