@@ -21,6 +21,7 @@ from analysis.read.text_table import (
 )
 from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
+from table_files import counted
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
@@ -311,7 +312,7 @@ def read_votes_by(
     keep = np.isfinite(values)
     if not keep.all():
         lines = name_lines(table, ~keep)
-        table.decisions.append(f"{int((~keep).sum())} rows without a rating excluded ({lines})")
+        table.decisions.append(f"{counted(int((~keep).sum()), 'row')} without a rating excluded ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: column '{columns[2]}' has no rating in any row")
     keep = answers_that_count(table, keep, "ratings")
@@ -464,7 +465,9 @@ def _against_references(votes: Votes, which: Codes, named: NDArray[Any], standar
     decisions = list(votes.decisions)
     if lost.any():
         told = names_where(votes.people, np.any(lost, axis=1))
-        decisions.append(f"{int(lost.sum())} votes excluded, without a vote on the reference by {told}")
+        decisions.append(
+            f"{counted(int(lost.sum()), 'vote')} excluded, without a vote on the reference by {told}"
+        )
     # References themselves do not appear in the result.
     kept = (references >= 0) & np.isfinite(scores).any(axis=0)
     people = np.any(np.isfinite(scores[:, kept]), axis=1)

@@ -24,6 +24,7 @@ from analysis.read.text_table import (
 )
 from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
+from table_files import counted
 
 # Read paired comparisons: who won, by side, with every doubt about the table raised as one line.
 
@@ -199,9 +200,10 @@ def read_comparisons(
 
 def _report_same(table: TextTable, same: NDArray[np.bool_]) -> None:
     if same.any():
+        number = int(same.sum())
         table.decisions.append(
-            f"{int(same.sum())} comparisons of an item with itself count in the prior only "
-            f"({name_lines(table, same)})"
+            f"{counted(number, 'comparison')} of an item with itself "
+            f"{'counts' if number == 1 else 'count'} in the prior only ({name_lines(table, same)})"
         )
 
 
@@ -258,7 +260,7 @@ def _outcomes(
     _refuse_unknown(table, outcome, missing, said, winner)
     if missing.any():
         lines = name_lines(table, missing)
-        table.decisions.append(f"{int(missing.sum())} rows without a winner excluded ({lines})")
+        table.decisions.append(f"{counted(int(missing.sum()), 'row')} without a winner excluded ({lines})")
     if missing.all():
         raise InputError(f"{table.source}: column '{winner}' names no winner in any row")
     return outcome, ~missing

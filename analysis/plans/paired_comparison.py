@@ -55,7 +55,9 @@ def comparisons_of(prepared: PlanRows) -> Comparisons:
     # As text, since the two columns may have different categories.
     same = (rows["left_cell"].astype(str) == rows["right_cell"].astype(str)).to_numpy()
     if same.any():
-        decisions.append(f"{same.sum()} comparisons of two clips of one cell excluded from the abilities")
+        decisions.append(
+            f"{counted(int(same.sum()), 'comparison')} of two clips of one cell excluded from the abilities"
+        )
         rows = rows[~same]
     if rows.empty:
         raise InputError(

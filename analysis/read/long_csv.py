@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
-from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count, repeats_said
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -20,6 +20,7 @@ from analysis.read.text_table import (
 from analysis.within.between import BetweenDesign, Covariate, between_design, no_groups
 from analysis.within.level_codes import level_codes
 from experiments.errors import InputError
+from table_files import counted
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,9 @@ def read_long_table(
     unusual_numbers(table, rating, values)
     keep = ~np.isnan(values)
     if not keep.all():
-        table.decisions.append(f"{(~keep).sum()} rows without a rating excluded ({name_lines(table, ~keep)})")
+        table.decisions.append(
+            f"{counted(int((~keep).sum()), 'row')} without a rating excluded ({name_lines(table, ~keep)})"
+        )
     if not keep.any():
         raise InputError(f"{path.name}: column '{rating}' has no rating in any row")
     # With trials named, a repeat is certain; without them it is only suspected.
@@ -143,9 +146,7 @@ def _repeats(
             f"{table.source}: {which} occurs twice with different data, again in line {table.line(row)}"
         )
     if again.any():
-        table.decisions.append(
-            f"{again.sum()} repeated rows of one trial were counted once ({name_lines(table, again)})"
-        )
+        table.decisions.append(f"{repeats_said(int(again.sum()), 'one trial')} ({name_lines(table, again)})")
     return np.asarray(again, dtype=bool)
 
 

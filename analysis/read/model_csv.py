@@ -13,6 +13,7 @@ from analysis.read.reading import EXPORT_COLUMNS, report_visits, rows_that_count
 from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
 from experiments.kinds.clip_rating import RATINGS
+from table_files import counted
 
 
 @dataclass(frozen=True)
@@ -86,11 +87,11 @@ def read_model_input(
         report_visits(table, keep)
     decisions = [*table.decisions, *left_out]
     if np.isnan(values).any():
-        decisions.append(f"{np.isnan(values).sum()} rows without a rating excluded")
+        decisions.append(f"{counted(int(np.isnan(values).sum()), 'row')} without a rating excluded")
     # Counted among the rows that are left, so that no row is named twice.
     for name, column in measured.items():
         if (without := np.isnan(column) & keep).any():
-            decisions.append(f"{without.sum()} rows without {name} excluded")
+            decisions.append(f"{counted(int(without.sum()), 'row')} without {name} excluded")
             keep = keep & ~without
     if not keep.any():
         raise InputError(f"{path.name}: no row has a usable rating")

@@ -15,6 +15,7 @@ from analysis.read.folder import reader_of
 from analysis.read.wide import refuse_names_twice, said_of_copies, wide_hint
 from analysis.within.level_codes import natural_order
 from experiments.errors import InputError, nearest
+from table_files import counted
 from table_files.cells import Cells
 from table_files.open import Reader
 
@@ -75,7 +76,8 @@ def trials_only(cells: Cells, asked: list[str], sorts: Cells | None) -> Cells:
     keep = ~cells.rows[asked].isin(EMPTY).any(axis=1).to_numpy()
     said = f"read as data of {program.name}"
     if not keep.all():
-        said += f": {(~keep).sum()} rows without {' and '.join(repr(name) for name in asked)} excluded"
+        left_out = counted(int((~keep).sum()), "row")
+        said += f": {left_out} without {' and '.join(repr(name) for name in asked)} excluded"
         if sorts is not None:
             counts = sorts.rows.iloc[np.flatnonzero(~keep), 0].replace("", "no sort").value_counts()
             said += f" ({', '.join(f'{sort} {count}' for sort, count in counts.items())})"

@@ -20,6 +20,7 @@ from analysis.read.text_table import (
 from analysis.thresholds.likelihood import Trials
 from analysis.within.level_codes import given_orders
 from experiments.errors import InputError
+from table_files import counted
 
 Array = NDArray[np.float64]
 
@@ -93,7 +94,9 @@ def read_answers(
         keep &= np.isfinite(across)
     if not keep.all():
         lines = name_lines(table, ~keep)
-        table.decisions.append(f"{int((~keep).sum())} rows without stimulus or answer excluded ({lines})")
+        table.decisions.append(
+            f"{counted(int((~keep).sum()), 'row')} without stimulus or answer excluded ({lines})"
+        )
     if not keep.any():
         raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
     # Last, so that its counts are of rows that would otherwise be used.

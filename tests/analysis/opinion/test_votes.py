@@ -45,7 +45,7 @@ def test_differential_scores_are_against_each_persons_hidden_reference(tmp_path:
     assert [(one.name, one.mos, one.n) for one in result.items] == [("x1", 3.0, 3), ("y1", 4.0, 2)]
     low, high = stats.t.interval(0.95, 2, 3.0, stats.sem([3, 5, 1]))
     assert (result.items[0].ci_low, result.items[0].ci_high) == pytest.approx((low, high))
-    assert "1 votes excluded, without a vote on the reference by p3" in result.decisions
+    assert "1 vote excluded, without a vote on the reference by p3" in result.decisions
     crushed = fitted(hidden(tmp_path), Standard("acr-hr", "source", highest=5, crush=True))
     assert crushed.items[1].mos == pytest.approx((7 * 6 / 8 + 2) / 2)
 

@@ -118,7 +118,7 @@ def test_contents_and_observers_without_information_are_named(tmp_path: Path) ->
     result = scale_jod(_read(file).by_content(), bootstrap=0, screen=True)
     assert "excluded, with a single item: z" in result.decisions
     assert "not screened, with one answer: single" in result.decisions
-    assert any("1 comparisons of an item with itself count in the prior only" in s for s in result.decisions)
+    assert any("1 comparison of an item with itself counts in the prior only" in s for s in result.decisions)
     last = next(one for one in result.observers if one.name == "single")
     assert (last.n, last.log_likelihood, last.is_far) == (1, None, False)
     assert len(result.observers) == 9

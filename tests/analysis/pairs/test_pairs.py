@@ -226,8 +226,8 @@ def test_of_an_export_only_answers_that_count_are_compared(tmp_path: Path) -> No
     table.write_text("\n".join(",".join(row) for row in (names, *rows)) + "\n")
     comparisons = read_comparisons(table, "left_cell", "right_cell", "winner")
     assert comparisons.outcome.tolist() == [0, 1, 0]
-    assert "1 practice and attention trials excluded" in comparisons.decisions
-    assert "1 failed plays excluded" in comparisons.decisions
+    assert "1 practice or attention trial excluded" in comparisons.decisions
+    assert "1 failed play excluded" in comparisons.decisions
     # The same columns in somebody else's table mean nothing to us.
     table.write_text(table.read_text().replace("left_cell", "one").replace("right_cell", "two"))
     assert len(read_comparisons(table, "one", "two", "winner").outcome) == 6

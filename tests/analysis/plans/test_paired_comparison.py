@@ -239,7 +239,7 @@ def test_two_clips_of_one_cell_are_left_out_and_said(tmp_path, rows) -> None:
     same = rows[0] | {"left_cell": "cartoon/model", "right_cell": "cartoon/model", "trial_index": 90}
     found = report(tmp_path, [*rows, same])
     assert found.numbers["n_comparisons"] == len(rows)
-    assert any("1 comparisons of two clips of one cell" in said for said in found.decisions)
+    assert any("1 comparison of two clips of one cell" in said for said in found.decisions)
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,7 @@ def test_the_last_line_of_gorilla_is_not_a_trial(tmp_path) -> None:
     path.write_text("\n".join([*lines, "END OF FILE,,,,"]), encoding="utf-8")
     data = read_long_table(path, "Participant Private ID", "Response", ["face"])
     assert len(data.rows) == len(ROWS)
-    assert "read as data of Gorilla: 1 rows" in data.decisions[0]
+    assert "read as data of Gorilla: 1 row" in data.decisions[0]
 
 
 def test_routines_of_psychopy_without_a_rating_are_not_trials(tmp_path) -> None:

@@ -176,7 +176,7 @@ def test_messages_name_the_file_next_to_the_line(tmp_path) -> None:
     with (folder / "p2.csv").open("a", encoding="utf-8") as file:
         file.write("calm,\n")
     data = read_long_table(folder, "file", "score", ["face"])
-    assert "1 rows without a rating excluded (line 4 of p2.csv)" in data.decisions
+    assert "1 row without a rating excluded (line 4 of p2.csv)" in data.decisions
     (folder / "p3.csv").write_text("face,score\ncalm,1\nwild,many\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"line 3 of p3\.csv"):
         read_long_table(folder, "file", "score", ["face"])

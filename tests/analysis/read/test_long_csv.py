@@ -39,13 +39,13 @@ def test_semicolons_and_decimal_commas_are_read_and_said(tmp_path) -> None:
 def test_missing_ratings_are_left_out_and_said(tmp_path, mark) -> None:
     data = read(tmp_path, f"id,y,f\n1,4,a\n1,{mark},b\n2,1,a\n2,2,b\n")
     assert len(data.rows) == 3
-    assert data.decisions == ("1 rows without a rating excluded (line 3)",)
+    assert data.decisions == ("1 row without a rating excluded (line 3)",)
 
 
 def test_repeated_trials_count_once_where_they_agree(tmp_path) -> None:
     data = read(tmp_path, "id,y,f,t\n1,4,a,1\n1,4,a,1\n1,2,b,2\n", trial="t")
     assert len(data.rows) == 2
-    assert data.decisions == ("1 repeated rows of one trial were counted once (line 3)",)
+    assert data.decisions == ("1 repeated row of one trial was counted once (line 3)",)
 
 
 def test_repeats_without_trial_numbers_are_kept_and_said(tmp_path) -> None:
