@@ -117,10 +117,11 @@ def anova(
 
     The JSON file has effects[], marginal_means[], pairwise[], dropped[], n_participants.
     """
-    from analysis.plans.result import analyse_cells
+    from analysis.plans.result import analysis_of
     from analysis.read.long_csv import design_of, read_long_table
     from analysis.read.text_table import refuse_ids_once
     from analysis.report.within_contents import contents_of
+    from analysis.within.anova import linear_anova
     from analysis.within.cell_means import cell_table
     from analysis.within.level_codes import in_given_order
 
@@ -141,10 +142,10 @@ def anova(
             refuse_ids_once(data.rows, participant, data.header, data.source)
         cells = cell_table(data.rows, participant, rating, factors)
         people = cells.participants
-        analysis = analyse_cells(
+        design = design_of(data.rows, participant, people, groups, covariates, centre, covariate_by_group)
+        analysis = analysis_of(
             cells,
-            between=design_of(data.rows, participant, people, groups, covariates, centre, covariate_by_group),
-            sum_of_squares=2 if type == 2 else 3,
+            linear_anova(cells.y, cells.factors, cells.levels, design, 2 if type == 2 else 3),
             name=file.stem,
             title=f"Analysis of {file.name}",
             source=data.source,

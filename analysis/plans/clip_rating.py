@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.plans.multiverse import MAX_RULES, Analyse, Multiverse, multiverse
 from analysis.plans.plan import Plan, PlanRows, prepare, refuse_unknown, where
-from analysis.plans.result import Analysis, analyse_cells, labels_of
+from analysis.plans.result import Analysis, analysis_of, labels_of
 from analysis.read.pool import Pool
 from analysis.read.reading import NoRatingsError, Reading
 from analysis.read.study_answers import StudyAnswers
@@ -55,29 +55,23 @@ class CellTests(NamedTuple):
 # Decision 0130: The paper's table shows the multivariate test.
 def run_tests(prepared: PlanRows) -> CellTests:
     """Average and test, and no more: what each choice of a multiverse needs."""
-    cells, design = _averaged(prepared)
-    return CellTests(
-        cells, linear_anova(cells.y, cells.factors, cells.levels, design or no_groups(len(cells.y)))
-    )
-
-
-def _averaged(prepared: PlanRows) -> tuple[CellTable, BetweenDesign | None]:
-    """Cell means, and the groups where the design has some."""
     experiment, rows = prepared.experiment, prepared.rows
     factors = experiment.compared_factors
     levels = {f.name: rated_levels(experiment, f.name) for f in experiment.factors}
     within = [name for name in factors if not experiment.factor(name).between]
     cells = cell_table(rows, "participant", "response", within, levels)
     between = [name for name in factors if name not in within]
-    return cells, groups_of(rows, cells.participants, between, levels) if between else None
+    groups = groups_of(rows, cells.participants, between, levels) if between else no_groups(len(cells.y))
+    return CellTests(cells, linear_anova(cells.y, cells.factors, cells.levels, groups))
 
 
 def analyse(prepared: PlanRows, rating: str = "response") -> Analysis:
     """Average and test; `rating` names what was rated."""
     experiment = prepared.experiment
-    cells, groups = _averaged(prepared)
-    return analyse_cells(
+    cells, anova = run_tests(prepared)
+    return analysis_of(
         cells,
+        anova,
         name=experiment.name,
         title=experiment.title,
         source=prepared.source,
@@ -85,7 +79,6 @@ def analyse(prepared: PlanRows, rating: str = "response") -> Analysis:
         synthetic=prepared.synthetic,
         decisions=prepared.decisions,
         labels=labels_of(experiment),
-        between=groups,
         experiment=experiment,
         exclusions=prepared.exclusions,
     )

@@ -11,9 +11,8 @@ from typing import Protocol
 from analysis.plans.exclusions import Exclusions, judge_rows
 from analysis.plans.plan import PlanRows
 from analysis.plans.result import plans_multivariate
-from analysis.within.anova import AnovaResult
+from analysis.within.anova import AnovaResult, Effect
 from analysis.within.cell_means import CellTable
-from analysis.within.effects import Effect
 from analysis.within.simple_effects import first_p, first_test, reports_multivariate
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from typing import TYPE_CHECKING
 
-from analysis.within.anova import AnovaResult, SumOfSquares, linear_anova
-from analysis.within.between import BetweenDesign, no_groups
+from analysis.within.anova import AnovaResult
 from analysis.within.cell_means import CellTable, name_cells
 from analysis.within.contrast_tests import Contrast, Equivalence, contrasts_of, equivalence, trends
 from analysis.within.estimates import MarginalMean, marginal_means
@@ -116,8 +115,9 @@ class Analysis:
         return [pair for pair in self.pairs if pair.effect == effect]
 
 
-def analyse_cells(
+def analysis_of(
     cells: CellTable,
+    anova: AnovaResult,
     *,
     name: str,
     title: str,
@@ -127,18 +127,17 @@ def analyse_cells(
     two_factor_pairs: bool = False,
     equivalence_bounds: tuple[float, float] | None = None,
     planned_contrasts: Sequence[tuple[str, Sequence[float]]] = (),
-    between: BetweenDesign | None = None,
-    sum_of_squares: SumOfSquares = 3,
     decisions: tuple[str, ...] = (),
     labels: Labels | None = None,
     experiment: "Experiment | None" = None,
     exclusions: "Exclusions | None" = None,
     univariate: bool = False,
 ) -> Analysis:
-    """Run every test on a table of cell means; a study that plans univariate tests gets these first, too."""
+    """What follows from the ANOVA of a table of cell means: means, pairs, simple effects, contrasts.
+
+    A study that plans univariate tests gets these first, too.
+    """
     univariate = univariate or not plans_multivariate(experiment)
-    design = between or no_groups(len(cells.y))
-    anova = linear_anova(cells.y, cells.factors, cells.levels, design, sum_of_squares)
     pairs = one_factor_pairs(anova)
     if two_factor_pairs:
         doubles = combinations(anova.all_factors, 2)

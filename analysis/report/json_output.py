@@ -4,7 +4,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from analysis.plans.result import Analysis
-from analysis.within.effects import Effect
+from analysis.within.anova import Effect
 from analysis.within.homogeneity import box_test, levene_tests
 from analysis.within.multivariate_tests import MultivariateTest
 from table_files import counted

@@ -14,7 +14,7 @@ import numpy as np
 from analysis.plans.result import Analysis
 from analysis.report.write import fill_template
 from analysis.robust import TRIM, Companions
-from analysis.within.effects import Effect
+from analysis.within.anova import Effect
 from analysis.within.homogeneity import box_test, levene_tests
 from analysis.within.pairwise import Pair
 from analysis.within.simple_effects import SimpleEffect

@@ -10,10 +10,9 @@ from analysis.report.json_output import as_data, left_out
 from analysis.report.numbers import apa_p, fixed, mean_digits, share, share_interval
 from analysis.report.r_script import r_files, robust_files
 from analysis.report.within_tables import all_tables, corrected_df, has_sphericity, uses_multivariate
-from analysis.within.effects import Effect
+from analysis.within.anova import Effect, UnivariateTest
 from analysis.within.multivariate_tests import MultivariateTest
 from analysis.within.simple_effects import SIGNIFICANCE, first_p
-from analysis.within.strata import UnivariateTest
 from table_files import counted
 
 # Sentences in APA style, one per effect.

@@ -16,10 +16,9 @@ from analysis.report.numbers import (
     share_interval,
     sum_digits,
 )
-from analysis.within.effects import Effect
+from analysis.within.anova import Effect, UnivariateTest
 from analysis.within.homogeneity import box_test, levene_tests
 from analysis.within.simple_effects import SIGNIFICANCE, first_test
-from analysis.within.strata import UnivariateTest
 
 # What the tables of an analysis share: titles, and the cells of a test.
 

@@ -1,20 +1,187 @@
 """The n-way ANOVA of cell means within and between participants, by the multivariate linear model."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy import special
 
 from analysis.within.between import BetweenDesign, no_groups, term_directions
-from analysis.within.contrasts import contrast_scores
-from analysis.within.effects import Effect, effects_of
-from analysis.within.strata import Hypothesis, above_noise, error_stratum
+from analysis.within.contrasts import contrast_scores, effect_name
+from analysis.within.multivariate_tests import MultivariateTest, MultivariateTests
+from analysis.within.strata import Hypothesis, Mauchly, SizeIntervals, above_noise, error_stratum
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
 SumOfSquares = Literal[2, 3]
+
+
+# Univariate F tests, uncorrected and corrected for lack of sphericity.
+
+
+class UnivariateTest(NamedTuple):
+    """Univariate F with sphericity corrections; NaN where undefined (the effect's reason says why).
+
+    `epsilon_hf` is uncapped; `p_hf` and the df of Huynh-Feldt use min(1, epsilon_hf).
+    """
+
+    ss: float
+    ss_error: float
+    df_effect: int
+    df_error: int
+    f_value: float
+    p_value: float
+    epsilon_gg: float
+    p_gg: float
+    epsilon_hf: float
+    p_hf: float
+    df_effect_gg: float
+    df_error_gg: float
+    df_effect_hf: float
+    df_error_hf: float
+
+
+def univariate_tests(hypotheses: Sequence[Hypothesis]) -> list[UnivariateTest]:
+    r"""The univariate test of each hypothesis; p values of all are computed together.
+
+    Notes
+    -----
+    .. math:: F = \frac{SS / (r q)}{SS_e / (q \nu)}
+        \quad\text{on } \epsilon r q \text{ and } \epsilon q \nu \text{ df} \tag{1}
+
+    q contrasts within people, r between them, nu the df of people within groups; epsilon is 1, Greenhouse and
+    Geisser's, or Huynh and Feldt's (`huynh_feldt`), at most 1.
+    """
+    everything = [_f_and_df(h) for h in hypotheses]
+    errors = [h.error for h in hypotheses]
+    columns = np.array(everything, dtype=np.float64).T
+    # Three p values per effect in one call: each call of scipy costs more than the values.
+    p_values = special.fdtrc(columns[1::2], columns[2::2], columns[0]).T.tolist()
+    return [
+        UnivariateTest(h.ss, e.ss, df1, df2, f, p, e.epsilon_gg, p_gg, e.epsilon_hf, p_hf, *corrected)
+        for h, e, (f, df1, df2, *corrected), (p, p_gg, p_hf) in zip(
+            hypotheses, errors, everything, p_values, strict=True
+        )
+    ]
+
+
+def _f_and_df(hypothesis: Hypothesis) -> tuple[float, int, int, float, float, float, float]:
+    """F and its df of effect and error: uncorrected, Greenhouse-Geisser's, Huynh-Feldt's."""
+    error = hypothesis.error
+    df1, df2 = hypothesis.rank * error.q, error.q * error.df
+    f_value = (hypothesis.ss / df1) / (error.ss / df2) if error.ss else math.nan
+    # With few participants there is no Huynh-Feldt epsilon: its df stay uncorrected.
+    gg, hf = error.epsilon_gg, 1.0 if math.isnan(error.epsilon_hf) else min(1.0, error.epsilon_hf)
+    return f_value, df1, df2, gg * df1, gg * df2, hf * df1, hf * df2
+
+
+# All that is known about each effect of a design.
+
+
+@dataclass(frozen=True)
+class Effect:
+    """All that is known about one effect. A test that does not exist is None, and its reason is given.
+
+    `eta_sq_partial` and its interval belong to the univariate F; the interval uses Greenhouse-Geisser's df.
+    `between` are factors between participants and covariates, `within` those within.
+    """
+
+    effect: str
+    between: tuple[str, ...]
+    within: tuple[str, ...]
+    univariate: UnivariateTest
+    eta_sq_generalized: float
+    hypothesis: Hypothesis = field(repr=False, compare=False)
+    sizes: SizeIntervals = field(repr=False, compare=False)
+    several: MultivariateTests = field(repr=False, compare=False)
+    at: int = field(repr=False, compare=False)
+
+    @property
+    def factors(self) -> tuple[str, ...]:
+        """Those between participants and covariates, then those within."""
+        return (*self.between, *self.within)
+
+    @property
+    def univariate_reason(self) -> str | None:
+        """Why there is no univariate F."""
+        return None if self.univariate.ss_error else self.hypothesis.reason
+
+    @property
+    def multivariate(self) -> MultivariateTest | None:
+        """The multivariate test, computed when it is asked for."""
+        return self.several.test(self.at)
+
+    @property
+    def multivariate_reason(self) -> str | None:
+        """Why there is no multivariate test."""
+        return self.hypothesis.reason
+
+    @property
+    def mauchly(self) -> Mauchly | None:
+        """Mauchly's test of the contrasts within."""
+        return self.hypothesis.error.mauchly
+
+    @property
+    def mauchly_reason(self) -> str | None:
+        """Why there is no test of Mauchly's."""
+        # A single contrast has nothing to be spherical with.
+        one = self.hypothesis.error.q == 1
+        return "one contrast: sphericity holds by definition" if one else self.hypothesis.reason
+
+    @property
+    def eta_sq_partial(self) -> float:
+        """SS / (SS + error SS)."""
+        return _share(self.univariate.ss, self.univariate.ss_error)
+
+    @property
+    def eta_sq_partial_ci(self) -> tuple[float, float]:
+        """Interval of `eta_sq_partial`."""
+        return self.sizes.interval(self.at)
+
+    @property
+    def omega_sq_partial(self) -> float:
+        """(F - 1) df1 / (F df1 + df2 + 1)."""
+        f, df1, df2 = self.univariate.f_value, self.univariate.df_effect, self.univariate.df_error
+        return (f - 1) * df1 / (f * df1 + df2 + 1)
+
+
+def _share(ss: float, ss_error: float) -> float:
+    """The share of the effect in two sums of squares; NaN where nothing varies."""
+    return ss / (ss + ss_error) if ss + ss_error else math.nan
+
+
+def effects_of(
+    hypotheses: Sequence[Hypothesis], factors: Sequence[str], ss_error_total: float, confidence: float
+) -> tuple[Effect, ...]:
+    """Every effect from its hypothesis; what several effects need is computed together.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+    factors : sequence of str
+        The within factors.
+    ss_error_total : float
+        Sum of the errors of all strata.
+    confidence : float
+        Coverage of the intervals of partial eta squared.
+    """
+    univariate = univariate_tests(hypotheses)
+    corrected = [(u.f_value, u.df_effect_gg, u.df_error_gg) for u in univariate]
+    # Shared by all effects: intervals take Newton steps, which are as fast for twenty effects as for one.
+    sizes = SizeIntervals(corrected, confidence)
+    several = MultivariateTests(hypotheses, sizes, confidence)
+    effects = []
+    for at, (h, u) in enumerate(zip(hypotheses, univariate, strict=True)):
+        within = tuple([factors[m] for m in h.error.members])
+        name, general = effect_name((*h.between, *within)), _share(h.ss, ss_error_total)
+        effects.append(Effect(name, h.between, within, u, general, h, sizes, several, at))
+    return tuple(effects)
+
+
+# The effects of a design together, from the cell means.
 
 
 @dataclass(frozen=True)

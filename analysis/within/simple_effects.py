@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.within.adjustments import holm
-from analysis.within.anova import AnovaResult
+from analysis.within.anova import AnovaResult, Effect, effects_of
 from analysis.within.contrasts import orthonormal_basis
-from analysis.within.effects import Effect, effects_of
 from analysis.within.multivariate_tests import MultivariateTest
 from analysis.within.strata import Hypothesis, above_noise, error_stratum
 from experiments.errors import InputError

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from analysis.cli import app
 from analysis.plans.clip_rating import analyse_study
 from analysis.plans.plan import plan_of
-from analysis.plans.result import Analysis, Labels, analyse_cells
+from analysis.plans.result import Analysis, Labels
 from analysis.read.long_csv import design_of, read_long_table
 from analysis.read.pool import Pool
 from analysis.read.study_answers import load_csv
@@ -19,6 +19,7 @@ from analysis.report.figures import bars_of, draw, figures_of
 from analysis.report.pictures import STYLE
 from analysis.within.cell_means import cell_table
 from experiments.load import load_experiment
+from tests.analysis.cell_analysis import analyse_cells
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 
 EXP3 = load_experiment("exp3").model_copy(update={"exclusions": ()})

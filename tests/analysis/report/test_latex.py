@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.plans.clip_rating import READING, analyse_study
-from analysis.plans.result import analyse_cells
 from analysis.read.study_answers import load_csv
 from analysis.report.contents import Contents, Part, Picture, Section
 from analysis.report.formats import Table
@@ -22,6 +21,7 @@ from analysis.report.within_contents import contents_of
 from analysis.report.write import write_report
 from analysis.within.cell_means import cell_table
 from experiments.load import load_experiment
+from tests.analysis.cell_analysis import analyse_cells
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 
 

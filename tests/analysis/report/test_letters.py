@@ -11,11 +11,11 @@ import pytest
 from matplotlib import font_manager
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-from analysis.plans.result import analyse_cells
 from analysis.report import pictures
 from analysis.report.figures import draw, figures_of
 from analysis.report.pictures import STYLE, further_letters, in_both_formats, missing_characters, new_figure
 from analysis.within.cell_means import cell_table
+from tests.analysis.cell_analysis import analyse_cells
 
 CHINESE = "眨眼"
 

@@ -8,11 +8,11 @@ import pytest
 from typer.testing import CliRunner
 
 from analysis.cli import app
-from analysis.plans.result import analyse_cells
 from analysis.read.long_csv import read_long_table
 from analysis.report.r_script import r_files
 from analysis.within.cell_means import cell_table
 from experiments.errors import InputError
+from tests.analysis.cell_analysis import analyse_cells
 from tests.analysis.report.r_process import needed, run_together
 
 GOLDEN = Path(__file__).parents[2] / "golden/r"

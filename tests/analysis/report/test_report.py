@@ -14,7 +14,7 @@ from analysis.cli import app
 from analysis.paper.document import plain
 from analysis.paper.statistics import check_text
 from analysis.plans.clip_rating import READING, analyse_study
-from analysis.plans.result import Analysis, analyse_cells
+from analysis.plans.result import Analysis
 from analysis.plans.sensitivity import bayes_factors, factor_text
 from analysis.read.study_answers import StudyAnswers, load_csv
 from analysis.report.figures import draw, figures_of
@@ -27,6 +27,7 @@ from analysis.report.within_tables import all_tables, corrected_df, paper_table
 from analysis.report.write import self_check, write_report
 from experiments.files import json_text
 from experiments.load import load_experiment
+from tests.analysis.cell_analysis import analyse_cells
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 
 
@@ -246,10 +247,10 @@ def test_the_note_under_a_figure_names_what_is_drawn(analysis: Analysis) -> None
 @pytest.mark.parametrize("people", [5, 14])
 def test_one_f_is_reported_first_everywhere(people: int) -> None:
     """Five people have no multivariate test of the interaction (6 contrasts): every F is univariate then."""
-    from analysis.plans.result import analyse_cells
     from analysis.report.within_contents import effect_p
     from analysis.report.within_tables import paper_table, simple_effects_table
     from analysis.within.cell_means import cell_table
+    from tests.analysis.cell_analysis import analyse_cells
 
     rng = np.random.default_rng(12)
     y = rng.normal(size=(people, 4, 3)) + 1.5 * np.arange(3) * np.arange(4)[:, None]

@@ -8,9 +8,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.within.anova import AnovaResult, within_anova
+from analysis.within.anova import AnovaResult, Effect, within_anova
 from analysis.within.cell_means import cell_table
-from analysis.within.effects import Effect
 from analysis.within.estimates import marginal_means
 from analysis.within.pairwise import pairs_of
 
