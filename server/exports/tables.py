@@ -238,16 +238,23 @@ def cells_of(
     every : sequence of Experiment, optional
         All versions of the study, newest first: by them each cell has the same name in every extract.
     """
+    versions = (experiment, *earlier)
+    # By identity: `definition_of` gives one object per declaration, which cannot be hashed.
+    of_version = {
+        id(version): _cells(version)
+        for version in {id(one): one for one in (*versions, *every)}.values()
+        if version is experiment or scales_of(version)
+    }
     names: dict[tuple[str, FactorLevels], str] = {}
     taken = {name.casefold() for name in _TAKEN}
-    for version in every or (experiment, *earlier):
-        for cell in _cells(version) if scales_of(version) else ():
+    for version in every or versions:
+        for cell in of_version.get(id(version), ()):
             key = (cell.scale, cell.factor_levels)
             if key not in names:
                 names[key] = unlike(cell.column.name, taken)
     cells: dict[tuple[str, FactorLevels], Cell] = {}
-    for version in (experiment, *earlier):
-        for cell in _cells(version) if version is experiment or scales_of(version) else ():
+    for version in versions:
+        for cell in of_version.get(id(version), ()):
             key = (cell.scale, cell.factor_levels)
             known = cells.setdefault(key, replace(cell, column=replace(cell.column, name=names[key])))
             cells[key] = replace(known, column=_of_both(known.column, cell.column))
@@ -299,8 +306,6 @@ def wide_columns(
     every: Sequence[Experiment] = (),
 ) -> list[Column]:
     """The run, its groups, its answers to forms, how many answers are averaged, and a column per cell."""
-    of_forms = {one.column.name for one in forms}
-    kept = [one for one in run_columns(forms, old_order) if one.name in OF_THE_RUN or one.name in of_forms]
     between = [
         Column(
             beside_runs(factor.name),
@@ -315,7 +320,18 @@ def wide_columns(
     number = Column(
         "answers", "integer", "Number of answers in main trials that the means are based on.", minimum=0
     )
-    return [*kept, *between, number, *(cell.column for cell in cells_of(experiment, earlier, every))]
+    return [
+        *_kept(forms, old_order),
+        *between,
+        number,
+        *(cell.column for cell in cells_of(experiment, earlier, every)),
+    ]
+
+
+def _kept(forms: Sequence[FormColumn], old_order: bool) -> list[Column]:
+    """The columns of the runs that the wide table has too."""
+    of_forms = {one.column.name for one in forms}
+    return [one for one in run_columns(forms, old_order) if one.name in OF_THE_RUN or one.name in of_forms]
 
 
 def wide_rows(
@@ -329,11 +345,7 @@ def wide_rows(
     """Rows in the order the runs began; a cell is empty where the run has no answer in it."""
     cells = cells_of(experiment, earlier)
     names = [column.name for column in run_columns(forms, extract.old_order)]
-    kept = [
-        names.index(column.name)
-        for column in wide_columns(experiment, forms, extract.old_order)
-        if column.name in names and column.name != "answers"
-    ]
+    kept = [names.index(column.name) for column in _kept(forms, extract.old_order)]
     between = [factor.name for factor in experiment.factors if factor.between]
     at = names.index("run")
     # Both are in the order the runs began, so that the answers of one run are in memory at a time.

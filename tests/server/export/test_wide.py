@@ -7,13 +7,14 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from experiments.declaration.experiment import Experiment
 from experiments.load import parse_experiment
 from server.context import Services
 from server.exports import tables
 from server.exports.csv_lines import rating_rows
 from server.exports.psych_ds import LANGUAGES, script
 from server.exports.schemas import EVERYTHING
-from server.exports.tables import cells_of, form_columns
+from server.exports.tables import Cell, cells_of, form_columns
 from server.models import Study
 from server.studies.creation import add_version, store_clips
 from tests.conftest import REPOSITORY
@@ -140,6 +141,25 @@ def test_a_cell_of_two_scales_has_the_range_of_both() -> None:
     cells = cells_of(newer, [older])
     assert [cell.column.name for cell in cells] == [cell.column.name for cell in cells_of(newer)]
     assert {(cell.column.minimum, cell.column.maximum) for cell in cells} == {(1, 9)}
+
+
+def test_the_cells_of_each_version_are_collected_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    newest = parse_experiment(SHORT)
+    older, oldest = (parse_experiment(SHORT.replace('"speed"', f'"{name}"')) for name in ("pace", "tempo"))
+    collected: list[Experiment] = []
+    collect = tables._cells
+
+    def noted(version: Experiment) -> list[Cell]:
+        collected.append(version)
+        return collect(version)
+
+    monkeypatch.setattr(tables, "_cells", noted)
+    cells = cells_of(newest, [oldest, newest], [newest, older, oldest])
+    assert [cell.column.name for cell in cells] == [cell.column.name for cell in cells_of(newest)] + [
+        f"rating_{character}_{speed}_3" for character in "ab" for speed in ("slow", "fast")
+    ]
+    assert [id(one) for one in collected[:3]] == [id(one) for one in (newest, oldest, older)]
+    assert len(collected) == 4
 
 
 def test_each_visit_has_its_own_means_and_one_is_in_memory_at_a_time(
