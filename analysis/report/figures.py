@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -126,25 +126,35 @@ def _keys(shown: Sequence[tuple[str, ...]]) -> list[str]:
     return keys
 
 
-def draw(analysis: Analysis, spec: FigureSpec) -> Figure:
+class DrawnFigure(NamedTuple):
+    """A figure, and what its means and error bars are, in words."""
+
+    figure: Figure
+    bars: str
+
+
+def draw(analysis: Analysis, spec: FigureSpec) -> DrawnFigure:
     """Draw one figure."""
+    shown = _arranged(analysis, spec)
+    bars = _bars_of(analysis, shown)
     with mpl.rc_context(STYLE):
         figure = new_figure()
         axes = figure.add_subplot()
-        _conditions(axes, analysis, spec)
+        _conditions(axes, shown, spec.style)
         _dress(axes, analysis, spec)
         marks = "Points, thin lines and clouds" if spec.style == "points" else "Points and thin lines"
-        said = f"{marks}: participants. {bars_of(analysis, spec)}"
-        write_note(figure, f"N = {analysis.n_participants}. {said}", analysis.synthetic)
-    return figure
+        write_note(
+            figure, f"N = {analysis.n_participants}. {marks}: participants. {bars}", analysis.synthetic
+        )
+    return DrawnFigure(figure, bars)
 
 
-def bars_of(analysis: Analysis, spec: FigureSpec) -> str:
+def _bars_of(analysis: Analysis, shown: "_Shown") -> str:
     """What the means and error bars of a figure are, and whether bars are cut at the ends of the scale.
 
     With groups or covariates they are the estimated marginal means of the table, and their intervals.
     """
-    cut = " Bars are cut at the ends of the scale." if _has_cut_bars(analysis, spec) else ""
+    cut = " Bars are cut at the ends of the scale." if _has_cut_bars(analysis, shown) else ""
     if _of_participants_alone(analysis):
         return f"Bars: 95% within-participant CI (Cousineau-Morey).{cut}"
     covariates = ", ".join(covariate.name for covariate in analysis.anova.between.covariates)
@@ -152,12 +162,11 @@ def bars_of(analysis: Analysis, spec: FigureSpec) -> str:
     return f"Means and bars: estimated marginal means{adjusted} and their 95% CI, as in the table.{cut}"
 
 
-def _has_cut_bars(analysis: Analysis, spec: FigureSpec) -> bool:
+def _has_cut_bars(analysis: Analysis, shown: "_Shown") -> bool:
     """Whether an interval of a declared study reaches beyond its scale, where the axis ends."""
     scale = _scale_of(analysis)
     if scale is None:
         return False
-    shown = _arranged(analysis, spec)
     low, high = shown.means - shown.errors, shown.means + shown.errors
     return bool((low < scale.minimum).any() or (high > scale.maximum).any())
 
@@ -195,17 +204,14 @@ class _Shown:
     shades: list[str]
 
 
-def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
-    shown = _arranged(analysis, spec)
+def _conditions(axes: Axes, shown: _Shown, style: Literal["points", "lines"]) -> None:
     values, groups, shades = shown.values, shown.groups, shown.shades
     n_groups, n_shades = len(groups), len(shades)
     offsets = (np.arange(n_shades) - (n_shades - 1) / 2) * _SPREAD / n_shades
     room = _SPREAD / n_shades
     # With clouds, points move to the left and leave the right half to the cloud.
     jitter = (
-        0.16 * spread_offsets(len(values)) - 0.24
-        if spec.style == "points"
-        else 0.34 * spread_offsets(len(values))
+        0.16 * spread_offsets(len(values)) - 0.24 if style == "points" else 0.34 * spread_offsets(len(values))
     ) * room
     for shade in range(n_shades):
         at = np.arange(n_groups) + offsets[shade]
@@ -215,7 +221,7 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             people = at[:, None] + jitter[None, :]
             axes.plot(people, values[:, :, shade].T, color=colour, alpha=0.12, linewidth=0.5, zorder=1)
         for group in range(n_groups):
-            if spec.style == "points":
+            if style == "points":
                 # Participants of other groups are NaN here.
                 there = values[~np.isnan(values[:, group, shade]), group, shade]
                 _cloud(axes, at[group] + 0.06 * room, there, 0.38 * room, colour)
@@ -235,7 +241,7 @@ def _conditions(axes: Axes, analysis: Analysis, spec: FigureSpec) -> None:
             yerr=shown.errors[:, shade],
             color=colour,
             marker=MARKERS[shade % len(MARKERS)],
-            linestyle="-" if spec.style == "lines" else "none",
+            linestyle="-" if style == "lines" else "none",
             linewidth=1.2,
             markersize=4.6,
             markeredgecolor="white",

@@ -247,12 +247,12 @@ def methods_of(analysis: Analysis) -> str:
 def draw_all(analysis: Analysis) -> tuple[Picture, ...]:
     """Draw every figure of the analysis."""
     # matplotlib takes a second to import, which commands that draw nothing need not pay
-    from analysis.report.figures import bars_of, draw, figures_of
+    from analysis.report.figures import draw, figures_of
     from analysis.report.pictures import in_both_formats
 
     pictures = []
     for spec in figures_of(analysis):
-        figure = draw(analysis, spec)
-        shown = f"{spec.title}: mean ratings and each participant's mean. {bars_of(analysis, spec)}"
+        figure, bars = draw(analysis, spec)
+        shown = f"{spec.title}: mean ratings and each participant's mean. {bars}"
         pictures.append(Picture(spec.key, spec.title, shown, *in_both_formats(figure)))
     return tuple(pictures)

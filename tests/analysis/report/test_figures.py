@@ -15,8 +15,10 @@ from analysis.plans.result import Analysis, Labels
 from analysis.read.long_csv import design_of, read_long_table
 from analysis.read.pool import Pool
 from analysis.read.study_answers import load_csv
-from analysis.report.figures import bars_of, draw, figures_of
+from analysis.report import figures
+from analysis.report.figures import draw, figures_of
 from analysis.report.pictures import STYLE
+from analysis.report.within_contents import draw_all
 from analysis.within.cell_means import cell_table
 from experiments.load import load_experiment
 from tests.analysis.cell_analysis import analyse_cells
@@ -51,7 +53,7 @@ def test_a_figure_has_the_means_and_intervals_of_the_table(within, between, cova
     assert shown >= {*within[:1], *between[:1]}
     seen = 0
     for spec in specs:
-        axes = draw(analysis, spec).axes[0]
+        axes = draw(analysis, spec).figure.axes[0]
         labels = [text.get_text() for text in axes.get_xticklabels()]
         for container in axes.containers:
             line, _, (bars,) = container.lines
@@ -69,7 +71,7 @@ def test_a_figure_has_the_means_and_intervals_of_the_table(within, between, cova
 def test_a_figure_shows_participants_in_their_own_group_alone() -> None:
     analysis = analysed("obk", ["phase"], ["treatment"], [])
     (spec,) = figures_of(analysis)
-    axes = draw(analysis, spec).axes[0]
+    axes = draw(analysis, spec).figure.axes[0]
     points = [line for line in axes.lines if line.get_marker() == "o" and line.get_markersize() == 2.6]
     drawn = sum(int(np.isfinite(np.asarray(line.get_ydata(), float)).sum()) for line in points)
     assert drawn == analysis.n_participants * 3
@@ -104,9 +106,26 @@ def test_bars_beyond_the_scale_are_cut_and_the_caption_says_so(extreme: bool, tm
     file = write_export(tmp_path / "r.csv", EXP3, rows_of(EXP3, ratings))
     analysis = analyse_study(EXP3, load_csv(file, EXP3, plan_of(EXP3.trial.kind).reading), Pool())
     [spec] = figures_of(analysis)
-    low, high = draw(analysis, spec).axes[0].get_ylim()
+    figure, bars = draw(analysis, spec)
+    low, high = figure.axes[0].get_ylim()
     assert (round(low, 1), round(high, 1)) == (0.8, 7.2)
-    assert ("Bars are cut at the ends of the scale." in bars_of(analysis, spec)) == extreme
+    assert ("Bars are cut at the ends of the scale." in bars) == extreme
+
+
+def test_the_conditions_of_a_figure_are_arranged_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing, note and alternative text are of the same conditions."""
+    arranged: list[str] = []
+    arrange = figures._arranged
+
+    def noted(analysis: Analysis, spec: figures.FigureSpec) -> figures._Shown:
+        arranged.append(spec.key)
+        return arrange(analysis, spec)
+
+    monkeypatch.setattr(figures, "_arranged", noted)
+    analysis = analysed("obk", ["phase", "hour"], ["treatment"], [])
+    pictures = draw_all(analysis)
+    assert arranged == [picture.key for picture in pictures]
+    assert all("estimated marginal means" in picture.alt for picture in pictures)
 
 
 def assert_texts_are_whole(figure) -> None:
@@ -142,7 +161,7 @@ def test_texts_of_a_figure_are_whole_whatever_their_length() -> None:
     }
     named = replace(analysis, labels=Labels(factors, levels))
     for spec in figures_of(named):
-        assert_texts_are_whole(draw(named, spec))
+        assert_texts_are_whole(draw(named, spec).figure)
 
 
 @pytest.mark.parametrize("n_rules", [1, 6])
