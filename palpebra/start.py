@@ -3,10 +3,6 @@
 import math
 import os
 import shlex
-import threading
-import time
-import urllib.error
-import urllib.request
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -138,7 +134,7 @@ def serve_folder(
     """
     use_folder(place)
     from server.cli_common import stored_services
-    from server.cli_run import make_welcome, print_links, run
+    from server.cli_run import make_welcome, print_links, serve
 
     with only_server_of(place):
         _prepare(place)
@@ -160,8 +156,7 @@ def serve_folder(
                 typer.echo(f"No browser was found. Open {address} yourself.")
 
         with around():
-            threading.Thread(target=_call_when_ready, args=(port, say_where), daemon=True).start()
-            run(port=port, welcome=False)
+            serve("127.0.0.1", port, announce=lambda _: say_where)
 
 
 def _prepare(place: Path) -> None:
@@ -197,16 +192,3 @@ def only_server_of(place: Path) -> Iterator[None]:
         raise InputError(
             f"another palpebra is serving {place}; stop it, or choose another folder by --folder"
         ) from error
-
-
-def _call_when_ready(port: int, action: Callable[[], None]) -> None:
-    """Wait until the server answers. Links that are printed earlier lead to an error page."""
-    # Without the proxy of the environment, which cannot reach this machine's own server.
-    direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
-    while True:
-        try:
-            direct.open(f"http://127.0.0.1:{port}/healthz", timeout=2).close()
-        except (urllib.error.URLError, OSError):
-            time.sleep(0.2)
-            continue
-        return action()

@@ -5,8 +5,11 @@ import shutil
 import socket
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import Thread
 from typing import Annotated, NamedTuple
 
 import typer
@@ -66,6 +69,19 @@ def run(
     PALPEBRA_PUBLIC_URL.
     Example: server run --host 0.0.0.0 --port 8000 --workers 2
     """
+    is_shown = sys.stdout.isatty() if welcome is None else welcome
+    serve(host, port, workers, _welcome if is_shown else None)
+
+
+Announce = Callable[[Services], Callable[[], None]]
+"""Prepares what to print, before the server starts; what it returns prints it."""
+
+
+def serve(host: str, port: int, workers: int = 1, announce: Announce | None = None) -> None:
+    """Serve until stopped; what `announce` prepares is printed once the server answers.
+
+    Links that are printed earlier lead to an error page.
+    """
     _check_free(host, port)
     # For this process and its workers; else they would take the URL of the start before.
     os.environ.setdefault(PUBLIC_URL, f"http://localhost:{port}")
@@ -76,8 +92,9 @@ def run(
         close_to_others(settings)
         begin_ledger(settings)
         services.settings.key  # noqa: B018 - made now, once, before workers ask for it
-        if sys.stdout.isatty() if welcome is None else welcome:
-            _print_welcome(services)
+        said = announce(services) if announce else None
+    if said is not None:
+        Thread(target=_call_when_ready, args=(host, port, said), daemon=True).start()
     # No access log: it would write every participant's internet address.
     with _shared_counts(workers):
         uvicorn.run(
@@ -193,10 +210,30 @@ def print_links(welcome: Welcome, public_url: str) -> None:
         out.print(f"{link.study} ({link.status}{group}): {public_url}{link.path}")
 
 
-def _print_welcome(services: Services) -> None:
+def _welcome(services: Services) -> Callable[[], None]:
+    """What `server run` prints: the links of open studies and of the admin site."""
     welcome, public_url = make_welcome(services), services.settings.public_url
-    print_links(welcome, public_url)
-    out.print(f"admin site: {public_url}/admin/")
-    if welcome.invitation:
-        url = invitation_url(public_url, welcome.invitation)
-        out.print(f"create the first account (link works once): {url}")
+
+    def print_welcome() -> None:
+        print_links(welcome, public_url)
+        out.print(f"admin site: {public_url}/admin/")
+        if welcome.invitation:
+            url = invitation_url(public_url, welcome.invitation)
+            out.print(f"create the first account (link works once): {url}")
+
+    return print_welcome
+
+
+def _call_when_ready(host: str, port: int, action: Callable[[], None]) -> None:
+    # All addresses of this machine include the loopback one; nothing can be sent to 0.0.0.0 or :: itself.
+    reached = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)  # noqa: S104 - nothing is bound here
+    address = f"[{reached}]" if ":" in reached else reached
+    # Without the proxy of the environment, which cannot reach this machine's own server.
+    direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    while True:
+        try:
+            direct.open(f"http://{address}:{port}/healthz", timeout=2).close()
+        except OSError:
+            time.sleep(0.2)
+            continue
+        return action()

@@ -204,6 +204,24 @@ def test_server_starts_without_extras_and_without_what_only_unix_has(tmp_path: P
     assert re.search(pattern, log.read_text())
 
 
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_server_run_prints_its_links_once_it_answers(tmp_path: Path, host: str) -> None:
+    port, log = unused_port(), tmp_path / "log"
+    command = [sys.executable, "-m", "server", "run", "--welcome", "--host", host, "--port", str(port)]
+    environment = {**os.environ, "PALPEBRA_DATA_FOLDER": str(tmp_path / "data")}
+    with (
+        log.open("wb") as stream,
+        subprocess.Popen(command, env=environment, stdout=stream, stderr=stream) as process,
+    ):
+        try:
+            until(lambda: "admin site" in log.read_text() or process.poll() is not None)
+            assert answers(port, "/healthz"), log.read_text()  # people may follow the link at once
+            until(lambda: "create the first account" in log.read_text())
+        finally:
+            process.terminate()
+    assert f"admin site: http://localhost:{port}/admin/" in log.read_text()
+
+
 def answers(port: int, path: str) -> bool:
     """Whether the server answers a request with 200."""
     try:
