@@ -8,6 +8,8 @@ from pydantic import AfterValidator, Field, model_validator
 from experiments.declaration.base import Declaration
 from experiments.errors import did_you_mean
 
+MIN_CLIP_PX, MAX_CLIP_PX = (320, 120), (1920, 1200)
+"""Least and greatest width and height of a clip, in pixels."""
 PROFILES = ("real", "phases", "model", "SL", "AL", "SL_ease", "AL_ease")
 """Built-in blink profiles: recorded, drawn phase by phase, PCA model, and the four textbook curves (symmetric
 or asymmetric, linear or eased). Any other value names a CSV file of closure samples next to the experiment's
@@ -116,9 +118,9 @@ class RenderSettings(Declaration):
     them. To choose one voice in the subtitles, add its name: `dialogue.vtt#Anna`."""
     fps: Fps = 30
     """Frame rate of the clip, in frames per second."""
-    width_px: Annotated[int, Field(ge=320, le=1920, multiple_of=2)] = 960
+    width_px: Annotated[int, Field(ge=MIN_CLIP_PX[0], le=MAX_CLIP_PX[0], multiple_of=2)] = 960
     """Width of the clip, in pixels."""
-    height_px: Annotated[int, Field(ge=120, le=1200, multiple_of=2)] = 360
+    height_px: Annotated[int, Field(ge=MIN_CLIP_PX[1], le=MAX_CLIP_PX[1], multiple_of=2)] = 360
     """Height of the clip, in pixels."""
 
     @model_validator(mode="after")

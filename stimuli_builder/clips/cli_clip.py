@@ -89,19 +89,23 @@ def clip_command(
     exemplar: Annotated[int, typer.Option(min=1, help="Which blink of this profile, by number.")] = 1,
     seed: Annotated[int, typer.Option(help="Random seed for all choices.")] = 2011,
     fps: Annotated[int, typer.Option(min=24, max=60, help="Frame rate.")] = 30,
-    size: Annotated[str, typer.Option(help="Width x height in px, at most 1920x1200.")] = "960x360",
+    size: Annotated[
+        str | None,
+        typer.Option(help="Width x height in px, at most 1920x1200 [default: the character's own size]."),
+    ] = None,
     clip_frames: Annotated[
         int | None, typer.Option(min=1, max=5_000, help="Length of the clip in frames.")
     ] = None,
     barcode: Annotated[bool, typer.Option("--test-barcode", help="Draw each frame's number.")] = False,
 ) -> None:
     """Render one clip."""
+    from stimuli_builder.clips.characters import geometry
     from stimuli_builder.clips.design_clips import SingleClip, render_single
     from stimuli_builder.clips.exemplars import reading_note
 
     if out.suffix.lower() != ".mp4":
         raise InputError(f"--out: expected a name ending in .mp4, got '{out.name}'; clips are H.264 in MP4")
-    width, height = parse_size(size)
+    width, height = geometry(character).clip_size_px() if size is None else parse_size(size)
     settings = settings_from(
         character=character,
         profile=profile if profile.endswith(".csv") else "real",

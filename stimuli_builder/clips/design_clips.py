@@ -30,7 +30,7 @@ from stimuli_builder.clips.curves import (
     samples_per_frame,
     shown_by,
 )
-from stimuli_builder.clips.exemplars import Exemplar, exemplar, of_declared_length
+from stimuli_builder.clips.exemplars import Exemplar, exemplar, number_of_blinks, of_declared_length
 from stimuli_builder.clips.geometry import Geometry, Movement
 from stimuli_builder.clips.jobs import ClipJob, Look, render
 from stimuli_builder.clips.life import draw_life, following_lids
@@ -385,13 +385,14 @@ def _blink(clip: SingleClip) -> Exemplar:
     settings = clip.settings
     if clip.profile in PROFILES or clip.profile.endswith(".csv"):
         chosen = settings.model_copy(update={"profile": clip.profile})
+        _require_exemplar(clip, number_of_blinks(chosen))
         return exemplar(chosen, clip.profile, clip.exemplar, clip.seed)
     shipped = {p.profile_id: p for paired in (False, True) for p in load_library(paired=paired)}
     if clip.profile not in shipped:
         names = [*PROFILES, *shipped]
         raise InputError(f"there is no blink profile '{clip.profile}'{did_you_mean(clip.profile, names)}")
-    profile = shipped[clip.profile]
-    profile = of_declared_length(profile, settings)
+    _require_exemplar(clip, 1)
+    profile = of_declared_length(shipped[clip.profile], settings)
     if settings.eyes == "separate" and profile.closure_other is None:
         raise InputError(
             f"profile {clip.profile} shows one eye; --eyes separate needs a profile of both eyes"
@@ -400,3 +401,13 @@ def _blink(clip: SingleClip) -> Exemplar:
     if settings.eyes == "alike":
         profile = replace(profile, closure_other=None)
     return Exemplar(amplitude_of(profile, settings.amplitude), repeated=False, phase_samples=0)
+
+
+def _require_exemplar(clip: SingleClip, count: int | None) -> None:
+    # In a study a recording may show up twice, and `stimuli plan` lists it. Here a number means one blink.
+    if count is not None and clip.exemplar > count:
+        numbers = f"1 to {count}, the blinks of" if count > 1 else "1, the only blink of"
+        raise InputError(
+            f"--exemplar: expected {numbers} profile '{clip.profile}', got {clip.exemplar}; --profile model "
+            "draws a new blink for every number"
+        )

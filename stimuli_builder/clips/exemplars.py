@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from experiments.declaration.rendering import RenderSettings
+from experiments.declaration.rendering import PROFILES, RenderSettings
 from experiments.errors import InputError, nearest
 from stimuli_builder.blinks.blink_model import (
     TEXTBOOK_KINDS,
@@ -156,6 +156,13 @@ def exemplar(
     # In turn: every onset comes once before any comes twice.
     phase = int(phases[(number - 1) % len(phases)])
     return Exemplar(amplitude_of(profile, settings.amplitude), repeated, phase)
+
+
+def number_of_blinks(settings: RenderSettings) -> int | None:
+    """How many different blinks a recorded profile or a file has; None if any number can be made."""
+    if settings.profile == "real":
+        return len(load_library(paired=settings.eyes == "separate"))
+    return None if settings.profile in PROFILES else len(read_closure_file(Path(settings.profile)))
 
 
 def of_declared_length(profile: BlinkProfile, settings: RenderSettings) -> BlinkProfile:

@@ -1,10 +1,11 @@
 """What clips need of a character: its size, scale and levels, and how far its face moves."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
-from experiments.declaration.rendering import RenderSettings
+from experiments.declaration.rendering import MAX_CLIP_PX, MIN_CLIP_PX, RenderSettings
 from experiments.errors import InputError
 
 if TYPE_CHECKING:
@@ -56,6 +57,16 @@ class Geometry:
                 f"height_px = {self.size_px[1]}"
             )
         return whole, top
+
+    def clip_size_px(self) -> tuple[int, int]:
+        """Size of a clip of the whole frame: its own, scaled into the limits of a clip."""
+        width, height = self.size_px
+        scale = min(1.0, MAX_CLIP_PX[0] / width, MAX_CLIP_PX[1] / height)
+        scale = max(scale, MIN_CLIP_PX[0] / width, MIN_CLIP_PX[1] / height)
+        clip_width = min(2 * math.ceil(width * scale / 2 - 1e-9), MAX_CLIP_PX[0])
+        # From the rounded width, so that the clip is never higher than the frame at that width.
+        clip_height = 2 * (round(height * clip_width / width) // 2)
+        return clip_width, min(clip_height, MAX_CLIP_PX[1])
 
     def px_per_mm_at(self, width_px: int) -> float:
         """Scale of a clip of that width."""

@@ -8,7 +8,10 @@ import pytest
 from PIL import Image
 
 from experiments.load import load_experiment
+from stimuli_builder.blinks.library import load_library
 from stimuli_builder.cli import main
+from stimuli_builder.clips.characters import geometry, shipped_names
+from stimuli_builder.clips.geometry import Geometry
 from tests.helpers.tiny_clips import make_clip_folder
 
 from .conftest import Small
@@ -49,8 +52,6 @@ def test_plan_gives_the_papers_counts(
 def test_plan_prints_the_recordings_shown_twice(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from stimuli_builder.blinks.library import load_library
-
     assert stimuli(monkeypatch, "plan", "exp1") == 0
     printed = capsys.readouterr().out
     assert "320 unique clips" in printed
@@ -132,6 +133,34 @@ def test_one_clip(
         assert len(list(container.decode(video=0))) == 90
 
 
+@pytest.mark.parametrize("name", shipped_names())
+def test_a_clip_has_its_characters_own_size(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str
+) -> None:
+    out = tmp_path / "clip.mp4"
+    short = ("--profile", "AL", "--duration", 5, "--clip-frames", 45, "--no-blur")
+    assert stimuli(monkeypatch, "clip", *short, "--character", name, "--out", out) == 0
+    with av.open(str(out)) as container:
+        stream = container.streams.video[0]
+        assert (stream.width, stream.height) == geometry(name).size_px
+
+
+@pytest.mark.parametrize(
+    ("own", "size"),
+    [
+        ((720, 900), (720, 900)),
+        ((1080, 1920), (676, 1200)),
+        ((3840, 2160), (1920, 1080)),
+        ((241, 91), (320, 120)),
+        ((641, 361), (642, 362)),
+    ],
+)
+def test_the_default_size_is_one_that_a_clip_may_have(own: tuple[int, int], size: tuple[int, int]) -> None:
+    character = Geometry("some", own, 6.0, 60.0, 10.0, None)
+    assert character.clip_size_px() == size
+    assert character.scaled(*size)[1] == 0
+
+
 def test_a_clip_of_a_file_with_decimal_commas(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -159,6 +188,8 @@ def test_a_clip_of_a_file_with_decimal_commas(
         (("--clip-frames", 99999999), "--clip-frames: expected at most 5,000"),
         (("--duration", 9, "--duration-ms", 300), "error: expected --duration or --duration-ms, got both"),
         (("--profile", "espbm-left-01", "--eyes", "separate"), "shows one eye"),
+        (("--profile", "real", "--exemplar", 100000), f"expected 1 to {len(load_library())}, the blinks of"),
+        (("--profile", "espbm-left-01", "--exemplar", 2), "--exemplar: expected 1, the only blink of"),
     ],
 )
 def test_bad_input_ends_in_one_line(
