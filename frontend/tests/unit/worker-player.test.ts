@@ -89,6 +89,31 @@ describe("what the page waits for from its worker", () => {
     await shown;
   });
 
+  it("puts the times of a worker whose clock has another origin on the page's clock", async () => {
+    vi.stubGlobal("requestAnimationFrame", (then: () => void) => setTimeout(then, 16));
+    const ahead_ms = 3_600_000;
+    const worker = new SilentWorker();
+    const own_ms = (): number => performance.timeOrigin + performance.now() + ahead_ms;
+    const post = worker.postMessage.bind(worker);
+    worker.postMessage = (message) => {
+      post(message);
+      if (message.type === "time") worker.answer((request) => ({ type: "time", request, at_ms: own_ms() }));
+    };
+    const player = playerOf(worker);
+    await player.measureClock();
+    const asked = player.prepare(CLIP, new ArrayBuffer(8), 30);
+    worker.answer(prepared);
+    await asked;
+    const shown = player.play(CLIP, { refresh_ms: 16, fixation_ms: 0 });
+    await vi.advanceTimersByTimeAsync(100);
+    const drawn_ms = performance.timeOrigin + performance.now();
+    const figures = { frames: 1, fps: 30, clock_gap_ms: 0, clock_late_ms: 0, refresh_ms: 16 };
+    worker.answer((request) => ({ type: "played", request, drawn: [[0, own_ms()]], ended_at_ms: own_ms() + 33, ...figures }));
+    const { drawn, ended_at_ms } = await shown;
+    expect(drawn[0]?.[1]).toBeCloseTo(drawn_ms, 0);
+    expect(ended_at_ms - drawn_ms).toBeCloseTo(33, 0);
+  });
+
   it("says that a worker which never answers did not", async () => {
     const worker = new SilentWorker();
     const waiting = expect(playerOf(worker).prepare(CLIP, new ArrayBuffer(8), 30)).rejects.toThrow(`no answer in ${LIMIT_MS} ms`);

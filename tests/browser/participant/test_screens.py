@@ -4,6 +4,7 @@ import json
 from itertools import pairwise
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from playwright.sync_api import Browser, Page
 
@@ -152,6 +153,27 @@ def test_a_clock_that_is_set_changes_no_duration_and_is_told(
         for row in server.rows("SELECT data FROM run_events WHERE type = 'clock_changed' ORDER BY id")
     ]
     assert shifts == [pytest.approx(-3 * 3_600_000, abs=500), pytest.approx(8 * 3_600_000, abs=500)]
+
+
+@pytest.mark.parametrize("forward_s", [60, -60])
+def test_a_clock_that_was_set_before_the_worker_was_made_changes_no_response_time(
+    server: ServerProcess, tmp_path: Path, page: Page, forward_s: int
+) -> None:
+    """As where the computer slept on the start page: the clip's worker counts from another origin."""
+    study = server.add_study(tmp_path / "clips", without(PLAIN, ("trials = 1", "trials = 0")))
+    server.start()
+    # The page's origin stays behind the clock, as Chromium keeps it; the worker is made by the real clock.
+    page.add_init_script(
+        "Object.defineProperty(performance, 'timeOrigin', "
+        f"{{ value: performance.timeOrigin - {forward_s * 1000} }})"
+    )
+    Visit(page, server.address).open(study.link_token).begin().instructions().trials()
+    rows = server.rows_soon("SELECT * FROM trial_ratings ORDER BY trial_index", 6)
+    times = pd.DataFrame(rows)[["rt", "rt_from_first_frame", "key_to_first_frame_ms"]].astype(float)
+    assert len(times) == 6
+    assert times.gt(0).all(axis=None) and times.lt(30_000).all(axis=None), times
+    # A clip of 8 frames at 30 per second: the last one is drawn 7 periods after the first.
+    assert (times["rt_from_first_frame"] - times["rt"]).median() == pytest.approx(7000 / 30, abs=20)
 
 
 CUT_OFF = """() => {

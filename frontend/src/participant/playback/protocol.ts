@@ -143,10 +143,11 @@ export function meanGap(stamps: readonly number[]): number | null {
   return regular.reduce((total, gap) => total + gap, 0) / regular.length;
 }
 
-// Messages between the page and the worker that decodes and draws. Times are absolute: timeOrigin + now, in ms.
+// Messages between the page and the worker that decodes and draws. Times are absolute, by the worker's clock: timeOrigin + now, in ms.
 
 /** What the worker answers, under the number that the page gave. */
 export type Request =
+  | { type: "time" }
   | { type: "prepare"; sha256: string; bytes: ArrayBuffer; fps: number | null }
   | { type: "play"; sha256: string; refresh_ms: number; fixation_ms: number }
   | { type: "compose"; sha256: string; parts: Part[]; width: number; height: number };
@@ -164,6 +165,7 @@ export interface Started {
 }
 
 export type FromWorker =
+  | { type: "time"; request: number; at_ms: number }
   | { type: "prepared"; request: number; frames: number; width: number; height: number; fps: number }
   | { type: "failed"; request: number; reason: string }
   | ({
@@ -175,7 +177,10 @@ export type FromWorker =
       ended_at_ms: number;
     } & Evenness);
 
-/** A clock that page and worker share: performance.now() counts from another origin in each. */
+/**
+ * Milliseconds by a clock that cannot be set. It begins at what the computer's clock said when the page or the worker was made,
+ * so that the two may lie apart: see `measureClock` of the worker's player.
+ */
 export function absoluteNow(): number {
   return performance.timeOrigin + performance.now();
 }

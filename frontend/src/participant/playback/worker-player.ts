@@ -1,6 +1,7 @@
 /** The player: chosen by what the browser can do, and shown by a worker where it can. */
 import { backoff } from "../outbox/outbox";
 import {
+  absoluteNow,
   ClipBroken,
   type ClipPlayer,
   type Part,
@@ -20,6 +21,8 @@ import { loadModule } from "../../ui/load-module";
 const DECODE_LIMIT_MS = 20_000;
 const START_LIMIT_MS = 10_000;
 const MAX_STARTS = 4;
+/** How often the worker's clock is read; the quickest answer counts. */
+const CLOCK_READINGS = 5;
 
 interface Waiting {
   resolve: (message: FromWorker) => void;
@@ -59,6 +62,7 @@ export class WorkerPlayer implements ClipPlayer {
   /** By request: a clip that is released and prepared again has two requests, and an old answer may be on its way. */
   private readonly waiting = new Map<number, Waiting>();
   private requests = 0;
+  private clock_ahead_ms = 0;
 
   constructor(
     private readonly worker: Worker,
@@ -70,6 +74,24 @@ export class WorkerPlayer implements ClipPlayer {
     // From here on the page cannot draw on it: only the worker does, whatever the page's own thread is busy with.
     const canvas = this.element.transferControlToOffscreen();
     this.send({ type: "canvas", canvas, background, sync_patch }, [canvas]);
+  }
+
+  /**
+   * Find out how far the worker's clock is ahead of the page's. Both run evenly, but the origin of each is what the computer's
+   * clock said when it was made: they differ where that clock was set, or the computer slept, between the two.
+   */
+  async measureClock(): Promise<void> {
+    let shortest_ms = Infinity;
+    for (let reading = 0; reading < CLOCK_READINGS; reading++) {
+      const asked_ms = absoluteNow();
+      const { at_ms } = (await this.ask({ type: "time" }, START_LIMIT_MS)) as FromWorker & { type: "time" };
+      const answered_ms = absoluteNow();
+      if (answered_ms - asked_ms >= shortest_ms) continue;
+      shortest_ms = answered_ms - asked_ms;
+      // Between question and answer the clocks may be the same.
+      const is_same = at_ms >= asked_ms && at_ms <= answered_ms;
+      this.clock_ahead_ms = is_same ? 0 : at_ms - (asked_ms + answered_ms) / 2;
+    }
   }
 
   prepare(sha256: string, bytes: ArrayBuffer, fps: number | null): Promise<Prepared> {
@@ -97,7 +119,10 @@ export class WorkerPlayer implements ClipPlayer {
     // A hidden page gets no refreshes: it then ends when it is looked at again, and the gap says so.
     const asked = this.ask({ type: "play", sha256, ...options }, null, Promise.all([layoutShown(), ready]));
     const message = (await asked) as FromWorker & { type: "played" };
-    const { drawn, ended_at_ms, clock_gap_ms, clock_late_ms, refresh_ms } = message;
+    const { clock_gap_ms, clock_late_ms, refresh_ms } = message;
+    // By the page's clock, as the presses of keys are.
+    const drawn = message.drawn.map(([index, at_ms]): [number, number] => [index, at_ms - this.clock_ahead_ms]);
+    const ended_at_ms = message.ended_at_ms - this.clock_ahead_ms;
     return { method: "webcodecs", drawn, ended_at_ms, clock_gap_ms, clock_late_ms, refresh_ms, stalls: 0, frames, fps };
   }
 
@@ -180,9 +205,13 @@ type Display = Pick<RunState["display"], "background" | "sync_patch">;
 export async function choosePlayer({ background, sync_patch }: Display): Promise<ClipPlayer> {
   const worker = hasWebCodecs() ? await startedWorker().catch(() => null) : null;
   try {
-    if (worker) return new WorkerPlayer(worker, background, sync_patch);
+    if (worker) {
+      const player = new WorkerPlayer(worker, background, sync_patch);
+      await player.measureClock();
+      return player;
+    }
   } catch (error) {
-    // A canvas that cannot be handed over, as where an extension guards canvases.
+    // A canvas that cannot be handed over, as where an extension guards canvases, or a worker that stopped.
     console.warn("clips are played by the video element", error);
   }
   const { VideoPlayer } = await loadModule(() => import("./video-player"));

@@ -185,7 +185,8 @@ scope.onmessage = ({ data }) => {
     context = data.canvas.getContext("2d", { alpha: false });
     blank();
     if (data.sync_patch) void loadSyncPatch();
-  } else if (data.type === "prepare") void prepare(data.request, data.sha256, data.bytes, data.fps);
+  } else if (data.type === "time") scope.postMessage({ type: "time", request: data.request, at_ms: absoluteNow() });
+  else if (data.type === "prepare") void prepare(data.request, data.sha256, data.bytes, data.fps);
   else if (data.type === "release") release(data.sha256);
   else if (data.type === "blank") resize(data.width, data.height);
   else if (data.type === "compose") compose(data.request, data.sha256, data.parts, data.width, data.height);
