@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.number_columns import numbers, unusual_numbers
-from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count, rows_with_names
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -306,7 +306,8 @@ def read_votes_by(
     roles = [*columns, *more]
     refuse_shared_roles(roles)
     table = read_text_table(path, roles, EXPORT_COLUMNS)
-    texts_required(table, columns[0])
+    named = rows_with_names(table)
+    texts_required(table, columns[0], rows=named)
     texts_required(table, columns[1])
     values = _scored_rows(table, columns, standard)
     keep = np.isfinite(values)
@@ -315,12 +316,12 @@ def read_votes_by(
         table.decisions.append(f"{counted(int((~keep).sum()), 'row')} without a rating excluded ({lines})")
     if not keep.any():
         raise InputError(f"{path.name}: column '{columns[2]}' has no rating in any row")
-    keep = answers_that_count(table, keep, "ratings")
+    keep = answers_that_count(table, keep, "ratings", roles)
     if standard.z_scores:
         values, keep = _z_scored(table, columns[1], standard.session, values, keep)
     parts = {"": keep}
     if by is not None:
-        texts_required(table, by)
+        texts_required(table, by, rows=named)
         of_row = table.columns[by].astype(str).to_numpy()
         parts = {str(name): keep & (of_row == name) for name in np.unique(of_row[keep])}
     return {
@@ -338,7 +339,7 @@ def _scored_rows(table: TextTable, columns: tuple[str, str, str], standard: Stan
         unusual_numbers(table, standard.reference, reference, "correct them or leave them empty")
         return reference - values
     if standard.first:
-        texts_required(table, standard.first)
+        texts_required(table, standard.first, rows=rows_with_names(table))
         # the vote compares the second with the first: it counts for the item, so that it is turned if first
         is_first = table.columns[standard.first].astype(str) == table.columns[columns[0]].astype(str)
         if is_first.all() or not is_first.any():
@@ -356,7 +357,7 @@ def _z_scored(
     """Standardized votes, and the rows that have one."""
     units = table.columns[participant].astype(str)
     if session is not None:
-        texts_required(table, session)
+        texts_required(table, session, rows=keep)
         units = units + ", " + table.columns[session].astype(str)
     names, codes = np.unique(units.to_numpy()[keep].astype(str), return_inverse=True)
     z = np.full(values.size, np.nan)
@@ -424,7 +425,7 @@ def _conditions(
     """The condition of each item."""
     if column is None:
         return None
-    texts_required(table, column)
+    texts_required(table, column, rows=keep)
     names, codes = np.unique(table.columns[column].astype(str).to_numpy()[keep], return_inverse=True)
     if len(names) < CONDITIONS_MIN:
         raise InputError(

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -214,6 +215,9 @@ def opinion(
         RepeatsChoice,
         typer.Option(help="A person's repeated votes on an item: mean (n is people) or votes (n is votes)."),
     ] = RepeatsChoice.MEAN,
+    by: Annotated[
+        str | None, typer.Option(help="Column of the dimension, such as scale: each is analyzed separately.")
+    ] = None,
     levels: LevelsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -228,10 +232,12 @@ def opinion(
       analysis opinion votes.csv --method acr-hr --reference source --scale 1:5 --screen bt500
 
       analysis opinion votes.csv --z-scores --session day
+
+      analysis opinion ratings.csv --by scale
     """
     from analysis.opinion import fit_opinion
     from analysis.report.rating_tables import opinion_text, raters_table, scores_table
-    from analysis.votes import P913_BELOW, Screening, Standard, read_votes
+    from analysis.votes import P913_BELOW, Screening, Standard, read_votes_by
 
     bounds = scale_bounds(scale)
     highest = None if bounds is None else bounds[1]
@@ -242,15 +248,17 @@ def opinion(
     if screen is not ScreenChoice.NONE:
         screening = {"rule": "p913" if screen is ScreenChoice.P913 else "bt500", "below": P913_BELOW}
     with progress_spinner("reading votes"):
-        votes = read_votes(file, item, participant, rating, levels or (), standard, screening)
-    result = fit_opinion(votes, repeats.value, standard)
-    save_json(json, asdict(result), votes.synthetic)
-    show_text(opinion_text(result, file.stem, votes.synthetic))
-    rows = [(one.name, one.mos, one.ci_low, one.ci_high) for one in result.items]
-    show_figure(lambda: _draw_scores(rows, votes.synthetic))
-    show_tables(
-        scores_table(result, file.stem, votes.synthetic), raters_table(result, file.stem, votes.synthetic)
-    )
+        votes = read_votes_by(file, (item, participant, rating), by, levels or (), standard, screening)
+    results = {name: fit_opinion(own, repeats.value, standard) for name, own in votes.items()}
+    numbers = {name: asdict(result) for name, result in results.items()}
+    synthetic = next(iter(votes.values())).synthetic
+    save_json(json, numbers[""] if by is None else {"by": by, "dimensions": numbers}, synthetic)
+    for name, result in results.items():
+        title = f"{file.stem}, {name}" if name else file.stem
+        show_text(opinion_text(result, title, synthetic))
+        rows = [(one.name, one.mos, one.ci_low, one.ci_high) for one in result.items]
+        show_figure(partial(_draw_scores, rows, synthetic))
+        show_tables(scores_table(result, title, synthetic), raters_table(result, title, synthetic))
 
 
 def _draw_scores(rows: list[tuple[str, float, float, float]], synthetic: bool) -> "Picture":

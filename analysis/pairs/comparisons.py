@@ -13,7 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from analysis.read.number_columns import MISSING_MARKS
-from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count, rows_with_names
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -163,17 +163,18 @@ def read_comparisons(
     roles = [left, right, winner, *more]
     refuse_shared_roles(roles)
     table = read_text_table(path, roles, EXPORT_COLUMNS)
+    counting = rows_with_names(table, EXPORTED_SIDES)
     for name in (left, right, *more):
-        texts_required(table, name)
+        texts_required(table, name, rows=counting)
     # Ids are compared as text: leading zeros are a part of them.
     columns = {name: table.columns[name].astype(str).to_numpy() for name in roles}
     if same:
-        _report_same(table, columns[left] == columns[right])
+        _report_same(table, counting & (columns[left] == columns[right]))
     else:
-        _refuse_same(table, columns[left], columns[right])
+        _refuse_same(table, columns[left], counting & (columns[left] == columns[right]))
     outcome, judged = _outcomes(table, columns[left], columns[right], columns[winner], winner, tie)
     # An export has practice and failed plays as well; other tables have rows that count only.
-    judged = answers_that_count(table, judged, "comparisons", EXPORTED_SIDES)
+    judged = answers_that_count(table, judged, "comparisons", roles, EXPORTED_SIDES)
     items = _items(table.columns[left], table.columns[right], judged)
     orders, said = given_orders({left: items}, levels)
     items = orders.get(left, items)
@@ -219,8 +220,7 @@ def _indices(items: tuple[str, ...], names: NDArray[Any]) -> Codes:
     return pd.Index(items, dtype=object).get_indexer(pd.Index(names, dtype=object)).astype(np.int64)
 
 
-def _refuse_same(table: TextTable, left: NDArray[Any], right: NDArray[Any]) -> None:
-    same = left == right
+def _refuse_same(table: TextTable, left: NDArray[Any], same: NDArray[np.bool_]) -> None:
     if same.any():
         row = int(np.argmax(same))
         raise InputError(f"{table.source}: line {table.line(row)} compares '{left[row]}' with itself")

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.read.number_columns import IN_COVARIATE, numbers, unusual_numbers
-from analysis.read.reading import EXPORT_COLUMNS, answers_that_count, repeats_said
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count, repeats_said, rows_with_names
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -71,8 +71,9 @@ def read_long_table(
     refuse_shared_roles(needed)
     # Columns of an export are read as well: they say which answers count.
     table = read_text_table(path, needed, EXPORT_COLUMNS)
+    named = rows_with_names(table)
     for name in (participant, *within, *between):
-        texts_required(table, name, factor=name != participant)
+        texts_required(table, name, factor=name != participant, rows=named)
     values = numbers(table, rating)
     # Before rows are left out: a typing error must not hide in them.
     refuse_out_of_scale(table, rating, values, scale)
@@ -95,7 +96,7 @@ def read_long_table(
     if not keep.any():
         raise InputError(f"{path.name}: no participant has a rating and all covariates")
     # Last, so that its counts are of rows that would otherwise be used.
-    keep = answers_that_count(table, keep, "ratings")
+    keep = answers_that_count(table, keep, "ratings", needed)
     if trial is None:
         _report_copies(table, needed, values, keep)
     rows = table.columns.assign(**{rating: values, **measured})[keep].reset_index(drop=True)

@@ -9,11 +9,20 @@ import pandas as pd
 
 from analysis.models.columns import columns_of, split_covariates
 from analysis.read.number_columns import IN_COVARIATE, holds_numbers, numbers, unusual_numbers
-from analysis.read.reading import EXPORT_COLUMNS, report_visits, rows_that_count
+from analysis.read.reading import (
+    EXPORT_COLUMNS,
+    refuse_mixed,
+    report_visits,
+    rows_that_count,
+    rows_with_names,
+)
 from analysis.read.text_table import TextTable, read_text_table, texts_required
 from experiments.errors import InputError
 from experiments.kinds.clip_rating import RATINGS
 from table_files import counted
+
+EXPORTED_CLIPS = frozenset({"kind", "profile_id"})
+"""Columns by which a table is an export of ratings of clips."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +65,7 @@ def read_model_input(
     """
     # Only the header: defaults depend on it, and on them which columns are read.
     header = read_text_table(path, [participant, rating], copies=False).header
-    exported = "kind" in header and "profile_id" in header
+    exported = set(header) >= EXPORTED_CLIPS
     if not within and exported and not between and not no_predictors:
         within = RATINGS.factors_in_header(header)
     if not item and exported and not no_predictors:
@@ -71,8 +80,9 @@ def read_model_input(
     nested = list(dict.fromkeys(part for name in random for part in columns_of(name)))
     texts = list(dict.fromkeys((participant, *within, *between, *item, *nested)))
     table = read_text_table(path, list(dict.fromkeys([*texts, rating, *covariates])), EXPORT_COLUMNS)
+    named = rows_with_names(table, EXPORTED_CLIPS)
     for name in texts:
-        texts_required(table, name, factor=name in (*within, *between))
+        texts_required(table, name, factor=name in (*within, *between), rows=named)
     values = numbers(table, rating)
     unusual_numbers(table, rating, values)
     _refuse_participants_as_items(table, participant, item)
@@ -84,6 +94,7 @@ def read_model_input(
     left_out: list[str] = []
     if exported:
         keep, left_out = rows_that_count(rows, keep, path.name)
+        refuse_mixed(table, keep, [*texts, *covariates])
         report_visits(table, keep)
     decisions = [*table.decisions, *left_out]
     if np.isnan(values).any():

@@ -1,6 +1,6 @@
 """Which columns and rows of the server's exports the analysis reads."""
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,7 +69,7 @@ class Reading:
 
 # Which rows of the server's export are answers that count.
 
-EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic")
+EXPORT_COLUMNS = ("kind", "verdict", "excluded", "synthetic", "scale", "data_series", "run_origin")
 _COUNT = (
     ("kind", ("main", ""), "practice or attention trial"),
     ("verdict", ("good", "uncertain", "flagged", ""), "failed play"),
@@ -120,8 +120,21 @@ _OF_AN_EXPORT = frozenset({"kind", "trial_index", "run", "verdict", "excluded"})
 """Columns that only the server's own exports have together."""
 
 
+def rows_with_names(table: TextTable, marks: Set[str] = _OF_AN_EXPORT) -> NDArray[np.bool_]:
+    """Rows (n,) that need a name in each column used: in an export those that count, else all.
+
+    An instructed answer or a motion check has no clip, so that its row has no level of any factor.
+    """
+    every = np.ones(len(table.columns), dtype=bool)
+    return rows_that_count(table.columns, every, table.source)[0] if marks <= set(table.header) else every
+
+
 def answers_that_count(
-    table: TextTable, keep: NDArray[np.bool_], what: str, marks: Set[str] = _OF_AN_EXPORT
+    table: TextTable,
+    keep: NDArray[np.bool_],
+    what: str,
+    used: Sequence[str],
+    marks: Set[str] = _OF_AN_EXPORT,
 ) -> NDArray[np.bool_]:
     """Of the rows to `keep` (n,) those that count, if the table is an export of the server.
 
@@ -131,7 +144,8 @@ def answers_that_count(
     Raises
     ------
     InputError
-        An export without any such row; `what` names the rows, such as `ratings`.
+        An export without any such row (`what` names the rows, such as `ratings`), or with answers that have
+        no common mean (`refuse_mixed`); `used` are the columns that the analysis separates or compares.
     """
     if not marks <= set(table.header):
         return keep
@@ -139,6 +153,7 @@ def answers_that_count(
     table.decisions.extend(left_out)
     if not keep.any():
         raise InputError(f"{table.source}: there are no usable {what}; {', '.join(left_out)}")
+    refuse_mixed(table, keep, used)
     report_visits(table, keep)
     return keep
 
@@ -146,6 +161,36 @@ def answers_that_count(
 def repeats_said(number: int, of: str) -> str:
     """The decision about rows that repeat trials."""
     return f"{counted(number, 'repeated row')} of {of} {'was' if number == 1 else 'were'} counted once"
+
+
+def refuse_mixed(table: TextTable, keep: NDArray[np.bool_], used: Sequence[str]) -> None:
+    """Refuse an export whose rows to `keep` (n,) have no common mean: of several scales, series or origins.
+
+    Raises
+    ------
+    InputError
+        Naming what is mixed, and how to get one of it.
+    """
+    for column, one, advice in _APART:
+        if column in table.columns.columns and column not in used:
+            values = sorted({str(name) for name in table.columns[column][keep].unique()} - {""})
+            # Answers of a pilot may be pooled with those of participants; simulated ones are no person's.
+            mixed = "simulated" in values if column == "run_origin" else True
+            if mixed and len(values) > 1:
+                there = f"{len(values)} ({', '.join(values)})"
+                raise InputError(f"{table.source}: expected answers {one}, got {there}; {advice}")
+
+
+_APART = (
+    (
+        "scale",
+        "on one scale",
+        "keep the rows of one, or use `analysis run`, or --by scale (opinion, agreement)",
+    ),
+    ("data_series", "of one data series", "export one with `server export STUDY --series N`"),
+    ("run_origin", "of one origin", "export one with `server export STUDY --origin participant`"),
+)
+"""Columns of an export whose values must not be pooled, what is expected, and what to do."""
 
 
 # Failures of the analysis that are nobody's fault.

@@ -310,15 +310,19 @@ def refuse_shared_roles(names: Sequence[str]) -> None:
             raise InputError(f"column '{name}' is named for two roles; each role needs a separate column")
 
 
-def texts_required(table: TextTable, name: str, factor: bool = False) -> None:
+def texts_required(
+    table: TextTable, name: str, factor: bool = False, rows: NDArray[np.bool_] | None = None
+) -> None:
     """Refuse empty cells in a column of names; codes of an SPSS file take the words the file has for them.
 
-    The order of the levels of a `factor` is said where it is not that of their names.
+    The order of the levels of a `factor` is said where it is not that of their names. Where only `rows` (n,)
+    are analyzed, the cells of the others may be empty.
     """
     table.columns[name] = _worded(table, table.columns[name], table.labels.get(name, {}), factor)
     column = table.columns[name]
-    if "" in column.cat.categories:
-        row = int(np.argmax((column == "").to_numpy()))
+    empty = (column == "").to_numpy()
+    if (empty if rows is None else empty & rows).any():
+        row = int(np.argmax(empty if rows is None else empty & rows))
         declared = ", or declared missing," if table.source.lower().endswith((".sav", ".zsav")) else ""
         raise InputError(
             f"{table.source}: '{name}' is empty{declared} in line {table.line(row)}; every row needs one"

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.read.number_columns import numbers
-from analysis.read.reading import EXPORT_COLUMNS, answers_that_count
+from analysis.read.reading import EXPORT_COLUMNS, answers_that_count, rows_with_names
 from analysis.read.text_table import (
     TextTable,
     name_lines,
@@ -85,7 +85,7 @@ def read_answers(
     # Columns of an export are read as well: they say which answers count.
     table = read_text_table(path, roles, EXPORT_COLUMNS)
     for name in named:
-        texts_required(table, name, factor=name == by)
+        texts_required(table, name, factor=name == by, rows=rows_with_names(table))
     values, answers = numbers(table, x), _binary(table, response)
     # Of a row without stimulus or answer nothing can be fitted.
     keep = np.isfinite(values) & np.isfinite(answers)
@@ -100,7 +100,7 @@ def read_answers(
     if not keep.any():
         raise InputError(f"{path.name}: no row has both '{x}' and '{response}'")
     # Last, so that its counts are of rows that would otherwise be used.
-    keep = answers_that_count(table, keep, "answers")
+    keep = answers_that_count(table, keep, "answers", roles)
     names = [
         None if name is None else table.columns[name].astype(object).to_numpy()[keep]
         for name in (participant, by)

@@ -1,14 +1,16 @@
 """Commands for any table read the server's own export too: practice and excluded runs do not count."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from analysis.pairs.comparisons import read_comparisons
 from analysis.read.long_csv import read_long_table
 from analysis.read.model_csv import read_model_input
 from analysis.thresholds.answers import read_answers
-from analysis.votes import read_votes
+from analysis.votes import read_votes, read_votes_by
 from experiments.errors import InputError
 
 HEADER = "run,participant,run_status,trial_index,kind,profile_id,face,stimulus,response,verdict,excluded\n"
@@ -94,3 +96,76 @@ def test_table_of_someone_else_with_a_column_kind_is_left_alone(tmp_path: Path) 
     file = tmp_path / "mine.csv"
     file.write_text("id,kind,score\n" + "".join(f"p{n},k{n % 2},{n}\n" for n in range(6)), encoding="utf-8")
     assert len(read_long_table(file, "id", "score", ["kind"]).rows) == 6
+
+
+ANSWERED = "rp1,p1,complete,9,attention,,,,1,good,0\n"
+"""An instructed answer: it has no clip, and so no level of any factor."""
+
+
+def test_checks_without_a_clip_stop_no_command(export: Path) -> None:
+    before = export.read_text(encoding="utf-8")
+    export.write_text(before + ANSWERED, encoding="utf-8")
+    data = read_long_table(export, "participant", "response", ["face"])
+    assert len(data.rows) == 4
+    assert sorted(data.rows["face"].cat.remove_unused_categories().cat.categories) == ["a", "b"]
+    assert len(read_model_input(export, "participant", "response", ["face"], ["stimulus"]).rows) == 4
+    assert read_votes(export, "stimulus", "participant", "response").items == ("1", "2")
+    assert len(read_answers(export, "stimulus", "response", by="face").x) == 4
+
+
+def test_an_empty_level_of_a_row_that_counts_is_refused(export: Path) -> None:
+    export.write_text(
+        export.read_text(encoding="utf-8") + ANSWERED.replace("attention", "main"), encoding="utf-8"
+    )
+    with pytest.raises(InputError, match="'face' is empty in line 10; every row needs one"):
+        read_long_table(export, "participant", "response", ["face"])
+
+
+def test_checks_without_a_clip_do_not_stop_comparisons(tmp_path: Path) -> None:
+    file = tmp_path / "pairs.csv"
+    file.write_text(
+        "kind,left_cell,right_cell,winner\nmain,a,b,left\nmain,b,a,left\nattention,,,right\n",
+        encoding="utf-8",
+    )
+    assert read_comparisons(file, "left_cell", "right_cell", "winner").items == ("a", "b")
+
+
+@pytest.mark.parametrize(
+    ("column", "values", "message"),
+    [
+        ("scale", ("calm", "eerie"), r"expected answers on one scale, got 2 \(calm, eerie\); keep the rows"),
+        ("data_series", ("1", "2"), r"of one data series, got 2 \(1, 2\); export one with .* --series N"),
+        (
+            "run_origin",
+            ("participant", "simulated"),
+            r"of one origin, got 2 \(participant, simulated\); export",
+        ),
+    ],
+)
+def test_answers_that_have_no_common_mean_are_not_pooled(
+    export: Path, column: str, values: tuple[str, str], message: str
+) -> None:
+    """Sliders from 0 to 100 and points from 1 to 7 had one mean; so had two data series."""
+    header, *rows = export.read_text(encoding="utf-8").splitlines()
+    lines = [f"{header},{column}", *(f"{row},{value}" for row in rows for value in values)]
+    export.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    readers: tuple[Callable[[], object], ...] = (
+        lambda: read_long_table(export, "participant", "response", ["face"]),
+        lambda: read_model_input(export, "participant", "response", ["face"], []),
+        lambda: read_votes(export, "stimulus", "participant", "response"),
+        lambda: read_answers(export, "stimulus", "response"),
+    )
+    for read in readers:
+        with pytest.raises(InputError, match=message):
+            read()
+    by = read_votes_by(export, ("stimulus", "participant", "response"), column)
+    assert set(by) == set(values)
+    assert len(read_long_table(export, "participant", "response", ["face", column]).rows) == 8
+
+
+def test_a_pilot_may_be_pooled_with_the_study(export: Path) -> None:
+    header, *rows = export.read_text(encoding="utf-8").splitlines()
+    origins = ("pilot", "participant")
+    lines = [f"{header},run_origin", *(f"{row},{origins[n % 2]}" for n, row in enumerate(rows))]
+    export.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    assert len(read_long_table(export, "participant", "response", ["face"]).rows) == 4
