@@ -201,7 +201,7 @@ def download_script(
 
 @router.get("/raw.ndjson", response_class=StreamingResponse)
 def download_raw(asked: Asked) -> StreamingResponse:
-    """Everything stored, one JSON object per run and line."""
+    """Plays, answers, drawn frames, events, forms and calibrations: one JSON object per run and line."""
     return asked.stream("raw", "application/x-ndjson", "raw.ndjson")
 
 

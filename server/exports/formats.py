@@ -124,7 +124,7 @@ def wide_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes
 
 
 def raw_json(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
-    """Everything stored, one JSON object per run and line; the last line confirms that it is complete."""
+    """One JSON object per run and line; the last line confirms that the file is complete."""
     number = repository.run_count(session, study, extract)
     for line in check_whole(tables.raw_lines(session, study, extract), number):
         yield encode_text(line)

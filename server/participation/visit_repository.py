@@ -148,6 +148,20 @@ def plays(session: Session, run: StudyRun) -> list[tuple[Rating, AssignedTrial, 
     return [(rating, trial, clip) for rating, trial, clip in session.execute(query)]
 
 
+def clips_by_trial(session: Session, run: StudyRun) -> dict[int, list[tuple[str, VersionClip]]]:
+    """The clips of each trial of a run with their roles, in the order in which the trial has them."""
+    query = (
+        select(TrialClip, VersionClip)
+        .join(VersionClip, VersionClip.id == TrialClip.version_clip_id)
+        .where(TrialClip.study_run_id == run.id)
+        .order_by(TrialClip.trial_index, TrialClip.position)
+    )
+    by_trial: dict[int, list[tuple[str, VersionClip]]] = {}
+    for one, clip in session.execute(query):
+        by_trial.setdefault(one.trial_index, []).append((one.role, clip))
+    return by_trial
+
+
 def events(session: Session, run: StudyRun) -> list[RunEvent]:
     """The events of a run in the order they came, heartbeats left out."""
     # Heartbeats come every 20 s and say only that the page was open.

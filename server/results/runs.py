@@ -21,6 +21,7 @@ from server.results.schemas import (
     Show,
     Timeline,
     TimelineCalibration,
+    TimelineClip,
     TimelineEvent,
     TimelineForm,
     TimelineTrial,
@@ -111,9 +112,10 @@ def identity(session: Session, study: Study, public_id: str, reader: Identity) -
 
 
 def timeline(session: Session, study: Study, public_id: str) -> Timeline:
-    """Everything stored of one run."""
+    """One run with every play, event, form and calibration; heartbeats of its page are left out."""
     run = visit_repository.find_run(session, study, public_id)
     plays = visit_repository.plays(session, run)
+    clips = visit_repository.clips_by_trial(session, run)
     answered = {rating.trial_index for rating, _, _ in plays}
     refused = visit_repository.refused_records(session, [run.id]).get(run.id, 0)
     not_good = sum(rating.verdict in ("flagged", "failed") for rating, _, _ in plays)
@@ -121,7 +123,7 @@ def timeline(session: Session, study: Study, public_id: str) -> Timeline:
         summary=summary(run, answered, not_good, refused, main_trials(session, [run])[run.id]),
         device=run.device,
         consented_at=run.consented_at,
-        trials=[_trial(*play) for play in plays],
+        trials=[_trial(*play, clips.get(play[0].trial_index, [])) for play in plays],
         events=[
             TimelineEvent(type=row.type, at_client=row.at_client, received_at=row.received_at, data=row.data)
             for row in visit_repository.events(session, run)
@@ -137,13 +139,16 @@ def timeline(session: Session, study: Study, public_id: str) -> Timeline:
 
 
 _FROM_RATING = (
-    "trial_index", "play", "rt", "comment", "method", "verdict", "verdict_rule",
-    "key_to_first_frame_ms", "frames_drawn", "frames_late", "frames_missing", "longest_gap_ms", "focus_lost",
-    "drawn", "saved_at",
+    "trial_index", "play", "rt", "rt_from_first_frame", "time_elapsed", "changes", "comment", "method",
+    "verdict", "verdict_rule", "key_to_first_frame_ms", "frames_drawn", "frames_late", "frames_missing",
+    "longest_gap_ms", "stalls", "focus_lost", "clock_gap_ms", "clock_late_ms", "refresh_rate_hz",
+    "device_pixel_ratio", "px_per_mm", "viewing_distance_mm", "disturbances", "drawn", "playback", "saved_at",
 )  # fmt: skip
 
 
-def _trial(rating: Rating, trial: AssignedTrial, clip: VersionClip | None) -> TimelineTrial:
+def _trial(
+    rating: Rating, trial: AssignedTrial, clip: VersionClip | None, clips: list[tuple[str, VersionClip]]
+) -> TimelineTrial:
     values = {name: getattr(rating, name) for name in _FROM_RATING}
     values |= {"answer": rating.payload, "response": rating.payload.get("response")}
     values |= {"kind": trial.kind, "block": trial.block, "expected_response": trial.expected_response}
@@ -151,6 +156,10 @@ def _trial(rating: Rating, trial: AssignedTrial, clip: VersionClip | None) -> Ti
         "cell": clip.cell if clip else None,
         "exemplar": clip.exemplar if clip else None,
         "clip_sha256": clip.clip_sha256 if clip else None,
+        "clips": [
+            TimelineClip(role=role, cell=one.cell, exemplar=one.exemplar, clip_sha256=one.clip_sha256)
+            for role, one in clips
+        ],
     }
     return TimelineTrial.model_validate(values)
 

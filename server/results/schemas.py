@@ -397,20 +397,33 @@ class RunPage(BaseModel):
     next: str | None = Field(description="Ask again with `before` = this; null at the end.")
 
 
+class TimelineClip(BaseModel):
+    """A clip of a trial and the role it was shown in."""
+
+    role: str
+    cell: str
+    exemplar: int
+    clip_sha256: str
+
+
 class TimelineTrial(BaseModel):
     """One play of one trial with its answer and what was shown."""
 
     trial_index: int
     kind: str
     block: int
-    cell: str | None
+    cell: str | None = Field(description="Of the trial's first clip.")
     exemplar: int | None
     clip_sha256: str | None
+    clips: list[TimelineClip]
     play: int
     answer: dict[str, Any] = Field(description="As its kind of trial stores it.")
     response: int | float | None = Field(description="The answer on the scale, of kinds that have one.")
     expected_response: int | None
     rt: float | None
+    rt_from_first_frame: float | None
+    time_elapsed: float | None
+    changes: int
     comment: str | None
     method: str
     verdict: str
@@ -420,8 +433,19 @@ class TimelineTrial(BaseModel):
     frames_late: int | None
     frames_missing: int | None
     longest_gap_ms: float | None
+    stalls: int | None
     focus_lost: bool | None
-    drawn: list[list[float]] | None
+    clock_gap_ms: float | None
+    clock_late_ms: float | None
+    refresh_rate_hz: float | None
+    device_pixel_ratio: float | None
+    px_per_mm: float | None
+    viewing_distance_mm: float | None
+    disturbances: dict[str, int] | None
+    drawn: list[list[int | float]] | None = Field(
+        description="Frame and time in ms of every drawn frame of a trial's one clip."
+    )
+    playback: dict[str, Any] | None = Field(description="How each of several clips was shown, by its role.")
     saved_at: datetime
 
 

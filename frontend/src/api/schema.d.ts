@@ -3614,6 +3614,12 @@ export interface components {
    distance_typed_mm: number | null;
    recheck_percent: number | null;
   };
+  TimelineClip: {
+   role: string;
+   cell: string;
+   exemplar: number;
+   clip_sha256: string;
+  };
   TimelineEvent: {
    type: string;
    at_client: string | null;
@@ -3638,6 +3644,7 @@ export interface components {
    cell: string | null;
    exemplar: number | null;
    clip_sha256: string | null;
+   clips: components["schemas"]["TimelineClip"][];
    play: number;
    answer: {
     [key: string]: unknown;
@@ -3645,6 +3652,9 @@ export interface components {
    response: number | null;
    expected_response: number | null;
    rt: number | null;
+   rt_from_first_frame: number | null;
+   time_elapsed: number | null;
+   changes: number;
    comment: string | null;
    method: string;
    verdict: string;
@@ -3654,8 +3664,21 @@ export interface components {
    frames_late: number | null;
    frames_missing: number | null;
    longest_gap_ms: number | null;
+   stalls: number | null;
    focus_lost: boolean | null;
-   drawn: number[][] | null;
+   clock_gap_ms: number | null;
+   clock_late_ms: number | null;
+   refresh_rate_hz: number | null;
+   device_pixel_ratio: number | null;
+   px_per_mm: number | null;
+   viewing_distance_mm: number | null;
+   disturbances: {
+    [key: string]: number;
+   } | null;
+   drawn: (number)[][] | null;
+   playback: {
+    [key: string]: unknown;
+   } | null;
    /** Format: date-time */
    saved_at: string;
   };
@@ -4247,6 +4270,7 @@ export type Ties = components['schemas']['Ties'];
 export type TimeBin = components['schemas']['TimeBin'];
 export type Timeline = components['schemas']['Timeline'];
 export type TimelineCalibration = components['schemas']['TimelineCalibration'];
+export type TimelineClip = components['schemas']['TimelineClip'];
 export type TimelineEvent = components['schemas']['TimelineEvent'];
 export type TimelineForm = components['schemas']['TimelineForm'];
 export type TimelineTrial = components['schemas']['TimelineTrial'];

@@ -1,5 +1,6 @@
 """Results of paired comparisons, against the exported rows counted by hand."""
 
+import json
 from collections import Counter
 from pathlib import Path
 from typing import Any
@@ -56,6 +57,26 @@ def test_every_pair_of_cells_has_its_choices(results: dict[str, Any], services: 
         len(rows),
     )
     assert results["left"] == sum(row["winner"] == "left" for row in rows)
+
+
+def test_a_timeline_has_both_clips_and_every_time(
+    viewer: Admin, answered: None, services: Services
+) -> None:
+    with services.database.read() as session:
+        rows = comparisons(session)
+    exported = {(row["run"], row["trial_index"], row["play"]): row for row in rows}
+    lines = viewer.get("/studies/short/data/raw.ndjson").text.splitlines()[:-1]
+    plays = [(run["summary"]["run"], play) for run in map(json.loads, lines) for play in run["trials"]]
+    assert len(plays) == len(exported)
+    for run, play in plays:
+        row = exported[run, play["trial_index"], play["play"]]
+        clips = {clip["role"]: (clip["cell"], clip["exemplar"], clip["clip_sha256"]) for clip in play["clips"]}
+        for side in clips:
+            names = (f"{side}_cell", f"{side}_exemplar", f"{side}_clip_sha256")
+            assert clips[side] == tuple(row[name] for name in names)
+        assert set(clips) == (set() if play["kind"] == "attention" else {"left", "right"})
+        for name in ("rt", "rt_from_first_frame", "time_elapsed", "changes", "stalls", "clock_gap_ms"):
+            assert play[name] == row[name]
 
 
 def test_a_level_is_compared_with_other_levels_only(results: dict[str, Any], services: Services) -> None:

@@ -242,7 +242,7 @@ const FILES: [file: string, title: string, words: string][] = [
     "De-identified data, metadata, codebook, scripts and definition in the community's standard folder.",
   ],
   ["codebook.md", "Codebook", "What every column means, with type and unit."],
-  ["raw.ndjson", "Raw data", "Everything stored, one JSON object per run, with every drawn frame and its time."],
+  ["raw.ndjson", "Raw data", "One JSON object per run: each play with its answer and every drawn frame, events, forms and calibrations."],
 ];
 
 /** For owners alone; each download is in the audit log. */

@@ -7,6 +7,7 @@ import { CopyId, TextWithIds } from "../ui/CopyId";
 import { plain, fixed, ruleWords, VERDICT_COLOURS, when, words } from "../ui/format";
 import { useState } from "react";
 import { useChange } from "../ui/useChange";
+import { answerWords } from "../replay/shown";
 import { Link, useParams } from "@tanstack/react-router";
 import { type Column, DataTable } from "../ui/DataTable";
 
@@ -174,7 +175,7 @@ const COLUMNS: Column<Trial>[] = [
       </>
     ),
   },
-  { title: "Clip", wrap: true, cell: (trial) => (trial.cell === null ? "–" : `${trial.cell} ${trial.exemplar ?? ""}`) },
+  { title: "Clip", wrap: true, cell: clipsOf },
   {
     title: "Answer",
     number: true,
@@ -213,14 +214,14 @@ function ReplayLink({ trial }: { trial: number }) {
   );
 }
 
-/** The one number, or what was answered on each scale. */
-function given({ response, answer }: Trial): string {
-  const answers = answer["answers"];
-  if (typeof answers !== "object" || answers === null) return String(response ?? "–");
-  return Object.entries(answers as Record<string, { response: number | null; not_applicable?: boolean }>)
-    .map(([scale, one]) => `${scale} ${one.response ?? (one.not_applicable ? "not applicable" : "–")}`)
-    .join(", ");
+/** Each clip of the trial; of several with its role. */
+function clipsOf({ clips }: Trial): string {
+  const named = clips.map(({ role, cell, exemplar }) => `${clips.length > 1 ? `${role} ` : ""}${cell} ${exemplar}`);
+  return named.join(", ") || "–";
 }
+
+/** The one number, or what was answered in words. */
+const given = ({ response, answer }: Trial): string => (response === null ? answerWords({ answer }) : String(response));
 
 function TrialTable({ trials }: { trials: Trial[] }) {
   return (

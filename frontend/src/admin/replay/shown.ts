@@ -168,7 +168,7 @@ export function changeBefore(changes: readonly number[], at_ms: number): number 
 // The words next to a replay.
 
 /** What was answered, whatever the kind of trial: each key of the answer that says something. */
-export function answerWords({ answer }: Play): string {
+export function answerWords({ answer }: Pick<Play, "answer">): string {
   if (answer === null) return "no answer";
   // How a trial came about, which is not what was answered: it is said after an answer, and makes none.
   const { answers, values, known, arrangement, step_frames, moves, ...rest } = answer;
