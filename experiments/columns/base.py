@@ -152,7 +152,8 @@ TIMES: tuple[Column, ...] = (
     Column(
         "time_elapsed",
         "number",
-        "Time from the start of the run to the answer, on the participant's clock.",
+        "Time from the start of the run to the answer during which its page was open, on the participant's "
+        "clock; on another device, or in a new tab, it continues from the last answer.",
         unit="ms",
         minimum=0,
         source="t",

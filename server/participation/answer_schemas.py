@@ -447,7 +447,7 @@ class RatingIn(BaseModel):
     rt: Milliseconds | None = Field(default=None, description="From the clip's last frame to the answer, ms.")
     rt_from_first_frame: Milliseconds | None = None
     time_elapsed: Milliseconds | None = Field(
-        default=None, description="From the run's start to the answer, ms."
+        default=None, description="Time the run's page was open before the answer, ms."
     )
     changes: Count = 0
     comment: Annotated[str, StringConstraints(max_length=5000)] | None = None

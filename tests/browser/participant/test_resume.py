@@ -6,10 +6,13 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page
 
 from tests.browser.server_process import ServerProcess
-from tests.browser.studies import PLAIN
+from tests.browser.studies import PLAIN, without
 from tests.browser.visit import Visit, axe_violations
 
 pytestmark = pytest.mark.browser
+PAUSE_MS = 3_000
+PAUSE = "ms => new Promise(go => { const from = performance.now(); setTimeout(() => go(performance.now() - from), ms); })"
+"""A person who reads; resolves with how long it took by the page's clock."""
 RATED = "SELECT trial_index, play, response FROM ratings WHERE kind = 'main' ORDER BY time_elapsed"
 
 
@@ -40,6 +43,26 @@ def test_a_reload_goes_on_at_the_next_unanswered_trial(
     visit.open(link)
     page.wait_for_selector(".code")
     assert visit.code() == code
+
+
+def test_time_before_a_reload_counts(server: ServerProcess, tmp_path: Path, page: Page) -> None:
+    """Of the instructions, and of the ready page after an answer: both were lost with the page."""
+    study = server.add_study(tmp_path / "clips", without(PLAIN, ("trials = 1", "trials = 0")))
+    server.start()
+    visit = Visit(page, server.address).open(study.link_token).begin()
+    page.wait_for_selector("text=What you will do")
+    read_ms = page.evaluate(PAUSE, PAUSE_MS)
+    page.reload()
+    visit.instructions().trials(most=1)
+    page.wait_for_selector(".ready")
+    rested_ms = page.evaluate(PAUSE, PAUSE_MS)
+    visit.open(study.link_token)
+    visit.instructions().trials()
+    first, second, *_ = (
+        row["time_elapsed"] for row in server.rows_soon("SELECT * FROM trial_ratings ORDER BY trial_index", 6)
+    )
+    assert first >= read_ms
+    assert second - first >= rested_ms
 
 
 def test_offline_answers_are_kept_and_sent_later(server: ServerProcess, tmp_path: Path, page: Page) -> None:

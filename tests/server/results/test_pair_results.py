@@ -59,9 +59,7 @@ def test_every_pair_of_cells_has_its_choices(results: dict[str, Any], services: 
     assert results["left"] == sum(row["winner"] == "left" for row in rows)
 
 
-def test_a_timeline_has_both_clips_and_every_time(
-    viewer: Admin, answered: None, services: Services
-) -> None:
+def test_a_timeline_has_both_clips_and_every_time(viewer: Admin, answered: None, services: Services) -> None:
     with services.database.read() as session:
         rows = comparisons(session)
     exported = {(row["run"], row["trial_index"], row["play"]): row for row in rows}
@@ -70,7 +68,9 @@ def test_a_timeline_has_both_clips_and_every_time(
     assert len(plays) == len(exported)
     for run, play in plays:
         row = exported[run, play["trial_index"], play["play"]]
-        clips = {clip["role"]: (clip["cell"], clip["exemplar"], clip["clip_sha256"]) for clip in play["clips"]}
+        clips = {
+            clip["role"]: (clip["cell"], clip["exemplar"], clip["clip_sha256"]) for clip in play["clips"]
+        }
         for side in clips:
             names = (f"{side}_cell", f"{side}_exemplar", f"{side}_clip_sha256")
             assert clips[side] == tuple(row[name] for name in names)

@@ -6,11 +6,12 @@ import { EventLog, type Outbox } from "../outbox/outbox";
 import type { OutboxItem } from "../outbox/store";
 import { hasWebCodecs } from "../playback/worker-player";
 import type { ClipPlayer } from "../playback/protocol";
-import { pixelRatio } from "../measured";
+import { duration, pixelRatio } from "../measured";
 import { ClipCache } from "../preload/clip-cache";
 import { untilMeasured, RunClock } from "../screen/window";
 import { ScreenState, screenShape } from "../screen/size";
 import { RunApi, type Session, type TrialKind, owed, Replays } from "../session";
+import { storageOf } from "./identity";
 import { applyWrite } from "./kept-visit";
 
 const LONGEST_AGENT = 1_000;
@@ -37,6 +38,15 @@ export interface Opening {
   unsent: OutboxItem[];
 }
 
+/** The run's clock: it goes on from the last answer, and after a reload from when the page before was left. */
+function runClock(run: RunState, over: AbortSignal): RunClock {
+  const tab = storageOf("sessionStorage");
+  const name = `palpebra elapsed ${run.run_id}`;
+  const clock = new RunClock(Math.max(run.elapsed_ms_before, duration(Number(tab?.getItem(name))) ?? 0));
+  window.addEventListener("pagehide", () => tab?.setItem(name, String(clock.elapsed())), { signal: over });
+  return clock;
+}
+
 export function openSession({ root, link, run, kind, checks, player, outbox, unsent }: Opening): Session {
   const screen = new ScreenState();
   unsent.forEach((item) => applyWrite(run, item));
@@ -53,7 +63,7 @@ export function openSession({ root, link, run, kind, checks, player, outbox, uns
     events: new EventLog(outbox),
     clips: new ClipCache(),
     player,
-    clock: new RunClock(run.elapsed_ms_before),
+    clock: runClock(run, over.signal),
     replays: new Replays(),
     warnings: run.warning ? [run.warning] : [],
     kind,

@@ -145,7 +145,7 @@ export class RunClock {
 
   constructor(private readonly before_ms: number) {}
 
-  /** Milliseconds since the run began, time between visits left out. */
+  /** Milliseconds that pages of the run have been open, time between them left out. */
   elapsed(): number {
     return Math.round(this.before_ms + performance.now() - this.started_ms);
   }
