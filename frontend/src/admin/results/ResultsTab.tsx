@@ -24,7 +24,7 @@ import { useChange } from "../ui/useChange";
 import { useParams } from "@tanstack/react-router";
 import { SeriesChooser } from "../ui/SeriesChooser";
 
-// Where the visits of an origin are that a data series has none of: said, and one press away.
+// Where else a study has visits of an origin: other data series, one press away.
 
 interface ElsewhereProps {
   every: Schemas["SeriesOut"][];
@@ -41,8 +41,6 @@ const PEOPLE: Record<DataOrigin, [one: string, several: string]> = {
 };
 
 function elsewhere({ every, shown, origin }: Omit<ElsewhereProps, "choose">): Schemas["SeriesOut"][] {
-  const present = every.find(({ number }) => number === shown);
-  if ((present?.runs[origin] ?? 0) > 0) return [];
   return every.filter(({ number, runs }) => number !== shown && (runs[origin] ?? 0) > 0);
 }
 
@@ -91,7 +89,9 @@ function MethodsCard({ study, origin, series, every, choose }: MethodsProps) {
               </Group>
             </Group>
             <Text>{data.paragraph}</Text>
-            <Elsewhere every={every} shown={data.series} origin={origin} choose={choose} />
+            {(every.find(({ number }) => number === data.series)?.runs[origin] ?? 0) === 0 && (
+              <Elsewhere every={every} shown={data.series} origin={origin} choose={choose} />
+            )}
             <Text size="sm" c="dimmed">
               The methods files of a report list what each rule excluded.
             </Text>
@@ -136,7 +136,7 @@ function NoAnswers({ origin, runs, every, series, choose, chooseSeries }: NoAnsw
   if (elsewhere({ every, shown: series, origin }).length > 0)
     return (
       <Stack gap="xs">
-        <Text c="dimmed">Data series {series} is new and has no answers yet.</Text>
+        <Text c="dimmed">Data series {series} has no answers yet.</Text>
         <Elsewhere every={every} shown={series} origin={origin} choose={chooseSeries} />
       </Stack>
     );
@@ -276,7 +276,10 @@ export function ResultsTab() {
               chooseSeries={setSeries}
             />
           ) : (
-            <OfKind study={study} data={data} factors={detail?.design.factors ?? []} />
+            <Stack>
+              <Elsewhere every={detail?.series ?? []} shown={data.series} origin={origin} choose={setSeries} />
+              <OfKind study={study} data={data} factors={detail?.design.factors ?? []} />
+            </Stack>
           )
         }
       </Answer>
