@@ -62,7 +62,7 @@ MAGNITUDE_WIDGET = """\
 /** A number that is typed. */
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
-import type { Ask, Widget } from "../../kinds/clip_rating/scale";
+import type { Ask, Widget } from "../../kinds/clip_rating/answer";
 
 export function widget({ scale, question, language, choose, enter }: Ask): Widget {
   if (scale.type !== "magnitude") throw new Error(`expected a magnitude, got ${scale.type}`);

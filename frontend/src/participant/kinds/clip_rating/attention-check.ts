@@ -2,8 +2,7 @@
 import type { TrialInfo } from "../../../api/schema";
 import { playbackRecord } from "../../playback/record";
 import type { Session } from "../../session";
-import { declaredRating, onlyResponse } from "./answer";
-import { askScales, type Rated } from "./scale";
+import { askScales, declaredRating, onlyResponse, type Rated } from "./answer";
 import { ratingBody, saveRating } from "../../trials/rating";
 import { askAttention } from "../../trials/answers";
 

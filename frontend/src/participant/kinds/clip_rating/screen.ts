@@ -6,11 +6,10 @@ import { BOOL, FLOAT, INT, plugin, type PluginClass, OBJECT, pressWhile, trial }
 import { playbackRecord } from "../../playback/record";
 import { unlessBroken, procedureFeedback, PARAMETERS, type TrialParameters, prepareClip, release, parametersOf } from "../../trials/trial";
 import { beginView, viewsBefore } from "../../views/ledger";
-import { declaredRating, bodyOf, type ClipRatingData, noAnswer, onlyResponse, rate, ready } from "./answer";
+import { declaredRating, bodyOf, type ClipRatingData, loadWidgets, noAnswer, onlyResponse, rate, ready } from "./answer";
 import { sayAlreadySeen, showOnce, type Shown, clipSize, showStage, type Stage } from "../../trials/showing";
 import { absoluteNow } from "../../playback/protocol";
 import { loadModule } from "../../../ui/load-module";
-import { loadWidgets } from "./scale";
 
 export type WatchAndRate = (session: Session, stage: Stage, parameters: TrialParameters) => Promise<RatingBody>;
 

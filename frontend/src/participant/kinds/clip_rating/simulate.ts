@@ -4,8 +4,7 @@ import { playbackRecord } from "../../playback/record";
 import type { Session } from "../../session";
 import { actWhileShown } from "../../trials/answers";
 import type { TrialParameters } from "../../trials/trial";
-import { declaredRating, type ClipRatingData, onlyResponse } from "./answer";
-import type { Scale } from "./scale";
+import { declaredRating, type ClipRatingData, onlyResponse, type Scale } from "./answer";
 
 export async function simulatedRating(session: Session, { trial, play }: TrialParameters): Promise<ClipRatingData> {
   const { scales, reference } = declaredRating(session);

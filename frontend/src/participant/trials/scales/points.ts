@@ -2,7 +2,7 @@
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
 import { scaleDirection, keyFor, valueOf } from "../../../ui/keys";
-import type { Ask, Widget } from "../../kinds/clip_rating/scale";
+import type { Ask, Widget } from "../../kinds/clip_rating/answer";
 import "./points.css";
 
 export function widget({ scale, language, t, meant, choose }: Ask): Widget {

@@ -2,7 +2,7 @@
 import { pick } from "../../../i18n";
 import { h } from "../../../ui/element";
 import { scaleDirection } from "../../../ui/keys";
-import type { Ask, Widget } from "../../kinds/clip_rating/scale";
+import type { Ask, Widget } from "../../kinds/clip_rating/answer";
 import "./slider.css";
 
 export function widget({ scale, question, language, t, meant, choose, enter }: Ask): Widget {
