@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stimuli_builder.tracking import kernels, solving_kernels
+from stimuli_builder.tracking import kernels
 from stimuli_builder.tracking.fit import Fitter, linear_parts, similarity_directions, work_out
 from stimuli_builder.tracking.model import principal, train
 from stimuli_builder.tracking.shapes import default_markers, with_border
@@ -77,7 +77,7 @@ def test_quadratic_form_hessian_equals_the_direct_one(model, seed):
     descent = steepest_descent(model, c)
     direct = (descent * model.weights) @ descent.T
     fast = np.empty_like(direct)
-    solving_kernels.hessian(work_out(model).hessian_forms, c, fast)
+    kernels.hessian(work_out(model).hessian_forms, c, fast)
     lower = np.tril_indices(len(direct))
     assert np.abs(fast - direct)[lower].max() < 1e-12 * np.abs(direct).max()
 
@@ -91,12 +91,10 @@ def test_right_side_equals_the_direct_sum(model, recording):
     kernels.compose(model.appearance, c, 0, mesh.pixel_count, look)
     kernels.differentiate(look, *mesh.neighbours(), gx, gy)
     sums, fast = np.empty(mesh.vertices.shape, np.float32), np.empty(len(c) + 4)
-    solving_kernels.accumulate(
-        error, gx, gy, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, sums
-    )
+    kernels.accumulate(error, gx, gy, mesh.triangles, mesh.starts, mesh.barycentric, mesh.x, mesh.y, sums)
     fast[:] = 0
-    solving_kernels.project(model.appearance, error, 0, mesh.pixel_count, fast)
-    solving_kernels.subtract_warp(algebra.directions, sums, fast)
+    kernels.project(model.appearance, error, 0, mesh.pixel_count, fast)
+    kernels.subtract_warp(algebra.directions, sums, fast)
     direct = steepest_descent(model, c) @ error
     assert np.allclose(fast, direct, atol=2e-4 * np.abs(direct).max())
 
@@ -108,12 +106,12 @@ def test_cholesky_solves(seed, size):
     root = rng.normal(size=(size, size + 3))
     matrix, right = root @ root.T, rng.normal(size=size)
     answer = right.copy()
-    assert solving_kernels.solve(matrix.copy(), answer)
+    assert kernels.solve(matrix.copy(), answer)
     assert np.allclose(matrix @ answer, right)
 
 
 def test_a_matrix_that_is_not_positive_definite_is_refused():
-    assert not solving_kernels.solve(np.array([[1.0, 0.0], [2.0, 1.0]]) @ np.diag([1.0, -1.0]), np.ones(2))
+    assert not kernels.solve(np.array([[1.0, 0.0], [2.0, 1.0]]) @ np.diag([1.0, -1.0]), np.ones(2))
 
 
 @settings(deadline=None, max_examples=25)
