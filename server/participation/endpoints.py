@@ -33,6 +33,7 @@ from server.participation.answer_schemas import (
 )
 from server.participation.intake import Intake
 from server.participation.judgement import judge_waiting
+from server.participation.places import follow, next_trials
 from server.participation.ratings import RatingDiffers
 from server.participation.refusals import EVIDENCE_REFUSALS, RunClosed, RunUnknown
 from server.participation.run_schemas import (
@@ -53,7 +54,6 @@ from server.participation.run_schemas import (
     StageChange,
     Unsupported,
 )
-from server.participation.trial_list import follow, next_trials
 from server.participation.versions import Versions
 
 # The participant's side of the API: links, runs, forms, events. A run's token is its only credential.

@@ -23,7 +23,7 @@ from server.participation.current_run import find_run, open_run
 from server.participation.intake import Intake, issue, tickets
 from server.participation.judgement import judge_run
 from server.participation.links import find_link, recruiter_of
-from server.participation.places import assign_slot
+from server.participation.places import assign_slot, shown_checks, trial_list
 from server.participation.refusals import (
     ConsentMissing,
     FormInvalid,
@@ -48,7 +48,6 @@ from server.participation.run_schemas import (
     Stage,
     Unsupported,
 )
-from server.participation.trial_list import shown_checks, trial_list
 from server.participation.versions import LoadedVersion, Versions
 from server.participation.warnings import EVENT, RULE, failed_checks, in_language, waiting_warning
 
