@@ -1,13 +1,13 @@
 /** Where the participant's page begins: link, gates, one tab, the run. */
 import type { RunStarted } from "../api/schema";
-import { Refused, withinTime } from "./request";
+import { call, Refused, withinTime } from "./request";
 import { loadMessages, type MessageKey, preferred, SHIPPED, translator, type Translate } from "../i18n";
 import { setLanguage, setSurround, type Beginning, startPage, titleOf } from "./flow/start-page";
 import { enter, RETURNED } from "./flow/enter";
 import { abilities, findings, type GateFinding, lackOfRoom, measures } from "./flow/gates";
 import { Identity, recruiterQuery, storageKey, storageOf } from "./flow/identity";
 import { KeptVisit } from "./flow/kept-visit";
-import { type Entry, persistently, reach, startRun, wayBack, asksForCode, type Claim } from "./flow/link";
+import { type Entry, persistently, reach, wayBack, asksForCode, type Claim } from "./flow/link";
 import { IndexedDbStore, MemoryStore, type OutboxStore } from "./outbox/store";
 import { loadModule } from "../ui/load-module";
 import { claimTab } from "./screen/window";
@@ -104,7 +104,8 @@ async function begun({ root, link_token }: Entry, identity: Identity, { language
     evidence: true,
     view_tickets: true,
   };
-  const claimed = (claim: Claim): Promise<RunStarted> => startRun(link_token, { ...start, client_id: identity.client_id(), ...claim });
+  const claimed = (claim: Claim): Promise<RunStarted> =>
+    call("POST", `/api/links/${encodeURIComponent(link_token)}/runs`, { body: { ...start, client_id: identity.client_id(), ...claim } });
   const kept = identity.code;
   const askForCode = async (why: MessageKey): Promise<RunStarted> =>
     (await loadModule(() => import("./flow/code-page"))).codePage(root, t, why, identity, claimed);

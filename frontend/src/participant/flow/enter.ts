@@ -1,5 +1,5 @@
 /** The run of a visit: from its start by its timeline to the last page. */
-import type { Session } from "../session";
+import { withoutPractice, type Session } from "../session";
 import type { RunStarted, RunState } from "../../api/schema";
 import { loadMessages } from "../../i18n";
 import { loadModule } from "../../ui/load-module";
@@ -7,6 +7,7 @@ import { runTimeline, type SimulationMode } from "../jspsych";
 import { Outbox } from "../outbox/outbox";
 import type { OutboxStore } from "../outbox/store";
 import { choosePlayer, hasWebCodecs } from "../playback/worker-player";
+import { call } from "../request";
 import { emptied, showNotice } from "../screens/support";
 import { loadChecks, loadKind } from "../kinds";
 import { saveInterrupted } from "../trials/rating";
@@ -16,7 +17,7 @@ import { fetchFirst, timeline } from "./timeline";
 import type { GateFinding } from "./gates";
 import { type Identity, storageOf } from "./identity";
 import type { KeptVisit } from "./kept-visit";
-import { type Entry, fetchRun, persistently, wayBack } from "./link";
+import { type Entry, persistently, wayBack } from "./link";
 import { describeDevice, flush, openSession } from "./open-session";
 
 // Lets a reload without a connection find the page: see service-worker.ts.
@@ -59,6 +60,11 @@ function watch(session: Session): void {
     if (outbox.state.failures === 0 && !document.hidden) events.add("heartbeat", { stage: session.run.stage });
   }, HEARTBEAT_MS);
   signal.addEventListener("abort", () => clearInterval(beat));
+}
+
+/** The run in its present state. */
+export async function fetchRun(token: string): Promise<RunState> {
+  return withoutPractice(await call<RunState>("GET", "/api/run", { token, timeout_ms: 30_000 }));
 }
 
 /** Under this name the tab counts how often the end led back to what was missing. */

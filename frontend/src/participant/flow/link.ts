@@ -1,12 +1,11 @@
 /** From the link to a run: is it open, can this browser show it, and which visit is it? */
-import type { LinkState, RunStarted, RunState } from "../../api/schema";
+import type { LinkState, RunStarted } from "../../api/schema";
 import { BUSY, call, NetworkError, Refused, isTemporary } from "../request";
 import type { Translate, MessageKey } from "../../i18n";
 import { backoff } from "../outbox/outbox";
 import { type Back, showNotice } from "../screens/support";
 import { filledIn } from "./identity";
 import type { Kept, KeptVisit } from "./kept-visit";
-import { withoutPractice } from "../session";
 
 /** What is known when the link has answered, or an earlier visit answers for it. */
 export interface Entry {
@@ -43,14 +42,6 @@ export function isNoAnswer(error: unknown): boolean {
 
 const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkState> =>
   call("GET", `/api/links/${encodeURIComponent(token)}`, { timeout_ms });
-
-/** The run in its present state. */
-export async function fetchRun(token: string): Promise<RunState> {
-  return withoutPractice(await call<RunState>("GET", "/api/run", { token, timeout_ms: 30_000 }));
-}
-
-export const startRun = (link_token: string, body: object): Promise<RunStarted> =>
-  call("POST", `/api/links/${encodeURIComponent(link_token)}/runs`, { body });
 
 /** The way back to the recruiter for who takes no part. A visit that an earlier page has kept knows none. */
 export function wayBack(t: Translate, { way_back }: Partial<Pick<LinkState, "way_back">>): Back {

@@ -6,7 +6,8 @@ import { loadModule } from "../../ui/load-module";
 import type { RunStarted, LinkState } from "../../api/schema";
 import { type Abilities, type GateFinding, lackOfRoom, measures } from "./gates";
 import type { Identity } from "./identity";
-import { type Entry, fetchRun, persistently, wayBack } from "./link";
+import { fetchRun } from "./enter";
+import { type Entry, persistently, wayBack } from "./link";
 
 const REFUSALS: Record<string, MessageKey> = {
   link_unknown: "link_unknown",
