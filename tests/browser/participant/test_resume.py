@@ -11,7 +11,10 @@ from tests.browser.visit import Visit, axe_violations
 
 pytestmark = pytest.mark.browser
 PAUSE_MS = 3_000
-PAUSE = "ms => new Promise(go => { const from = performance.now(); setTimeout(() => go(performance.now() - from), ms); })"
+PAUSE = (
+    "ms => new Promise(go => { const from = performance.now(); "
+    "setTimeout(() => go(performance.now() - from), ms); })"
+)
 """A person who reads; resolves with how long it took by the page's clock."""
 RATED = "SELECT trial_index, play, response FROM ratings WHERE kind = 'main' ORDER BY time_elapsed"
 
