@@ -199,7 +199,9 @@ def _definition_in_use(
 
     own, reading = definition_sha256(shipped), plan_of(shipped.trial.kind).reading
     answered = answered_versions(url, shipped, reading, study)
-    # Of several studies, none is chosen here: `load_database` says which there are.
+    if answered["study"].nunique() > 1:
+        answered = answered[answered["trial_kind"] == shipped.trial.kind]
+    # Of several studies of this kind none is chosen here: `load_database` says which there are.
     if answered["study"].nunique() != 1:
         return shipped, None
     # The same choice as among the answers themselves, whose columns these are.

@@ -65,7 +65,7 @@ def answered_versions(url: str, experiment: Experiment, reading: Reading, study:
     """`AnswersQuery.versions` of this database; raises as `load_database`, but not where there is no row."""
     query = AnswersQuery(url, reading, experiment.name, study)
     try:
-        return query.versions()
+        return query.versions(experiment.trial.kind)
     finally:
         query.close()
 
@@ -143,31 +143,32 @@ class AnswersQuery:
             columns[name] = np.array([bool(row[i]) for row in of_category], dtype=bool)[taken]
         return columns
 
-    def versions(self) -> pd.DataFrame:
-        """Study, version, series, declaration and origin of the answers, of whatever kind of trial.
+    def versions(self, kind: str) -> pd.DataFrame:
+        """Study, version, series, declaration, origin and `trial_kind` of the answers, of whatever kind.
 
-        One row per combination, in columns of the same names as in the views.
+        One row per combination; the other columns are called as in the views. `kind` is that of this view.
         """
         # Per run and not per answer: a view would read every answer for these few rows.
         query = text(
-            "SELECT DISTINCT s.name, v.number, v.series, v.definition_sha256, r.origin FROM study_runs r "
-            "JOIN study_versions v ON v.id = r.version_id JOIN studies s ON s.id = r.study_id "
-            "WHERE v.experiment = :experiment AND r.origin <> 'preview' AND r.erased_at IS NULL "
-            "AND EXISTS (SELECT 1 FROM trial_ratings t JOIN assigned_trials a "
+            "SELECT DISTINCT s.name, v.number, v.series, v.definition_sha256, r.origin, "
+            "(SELECT t.kind FROM trial_ratings t JOIN assigned_trials a "
             "ON a.study_run_id = t.study_run_id AND a.trial_index = t.trial_index "
-            "WHERE t.study_run_id = r.id AND a.kind IN :kinds)"
+            "WHERE t.study_run_id = r.id AND a.kind IN :kinds LIMIT 1) FROM study_runs r "
+            "JOIN study_versions v ON v.id = r.version_id JOIN studies s ON s.id = r.study_id "
+            "WHERE v.experiment = :experiment AND r.origin <> 'preview' AND r.erased_at IS NULL"
         ).bindparams(bindparam("kinds", KINDS, expanding=True))
         names, study = ("study", VERSION, SERIES, DECLARATION, "run_origin"), self._values.get("study")
         try:
             answered = self._connection.execute(query, {"experiment": self._values["experiment"]})
-            rows = [tuple(row) for row in answered if study in (None, row[0])]
+            # All answers of a run are of one kind; a run without any has none.
+            rows = [tuple(row) for row in answered if study in (None, row[0]) and row[-1] is not None]
         except DBAPIError:
             # Without row security a user may have rights on the view alone, which has answers of one kind.
             self._connection.rollback()
             counting = f"{self._where} AND kind IN ({_KINDS})"
             portions = self._portions(f"DISTINCT {', '.join(names)} FROM {self._view} WHERE {counting}")
-            rows = [tuple(row) for portion in portions for row in portion]
-        return pd.DataFrame(rows, columns=list(names))
+            rows = [(*row, kind) for portion in portions for row in portion]
+        return pd.DataFrame(rows, columns=[*names, "trial_kind"])
 
     def first_seen(self) -> dict[str, str]:
         """When the first row of each run was stored."""

@@ -37,13 +37,13 @@ REWORDED = PAIRS.replace("Which blink looked more natural?", "Which blink was mo
 PEOPLE = 5
 
 
-def save_and_answer(services: Services, toml: str, folder: Path) -> None:
+def save_and_answer(services: Services, toml: str, folder: Path, name: str = "lids") -> None:
     """Save this definition as the study's next version, and let simulated people answer it."""
     experiment = parse_experiment(toml)
     manifest = make_clip_folder(experiment, folder, frames=4)
     store_clips(services.clips, manifest, folder)
     with services.database.write() as session:
-        study = study_called(session, "lids") or create_study(session, "lids", experiment, None)
+        study = study_called(session, name) or create_study(session, name, experiment, None)
         add_version(session, study, toml, experiment, manifest, None)
         study.status = "live"
         link = link_token(
@@ -90,6 +90,23 @@ def test_ratings_alone_are_found_though_the_shipped_study_compares_pairs(
     assert found.exit_code == 0, found.stderr
     assert "Mean ratings by condition" in " ".join(found.stdout.split())
     assert "Study 'lids' was edited" in found.stderr
+
+
+def test_another_study_of_another_kind_does_not_hide_the_edit(
+    services: Services, database_url: str, tmp_path: Path
+) -> None:
+    """Of two studies with this experiment's name, the one with trials of the shipped kind is meant."""
+    save_and_answer(services, REWORDED, tmp_path / "one")
+    save_and_answer(services, RATINGS, tmp_path / "two", "rated lids")
+    found = run(database_url, "--no-report")
+    assert found.exit_code == 0, found.stderr
+    assert "Study 'lids' was edited: its own definition (version 1)" in " ".join(found.stderr.split())
+    rated = run(database_url, "--no-report", "--study", "rated lids")
+    assert "Study 'rated lids' was edited" in " ".join(rated.stderr.split())
+    assert "Mean ratings by condition" in " ".join(rated.stdout.split())
+    save_and_answer(services, PAIRS, tmp_path / "three", "more lids")
+    with pytest.raises(InputError, match="holds 2 studies; choose one with --study: lids, more lids"):
+        run(database_url, "--no-report")
 
 
 def test_the_report_says_that_an_edited_definition_was_used(
