@@ -8,7 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -126,15 +126,8 @@ def _keys(shown: Sequence[tuple[str, ...]]) -> list[str]:
     return keys
 
 
-class DrawnFigure(NamedTuple):
-    """A figure, and what its means and error bars are, in words."""
-
-    figure: Figure
-    bars: str
-
-
-def draw(analysis: Analysis, spec: FigureSpec) -> DrawnFigure:
-    """Draw one figure."""
+def draw(analysis: Analysis, spec: FigureSpec) -> tuple[Figure, str]:
+    """Draw one figure; it, and what its means and error bars are."""
     shown = _arranged(analysis, spec)
     bars = _bars_of(analysis, shown)
     with mpl.rc_context(STYLE):
@@ -146,7 +139,7 @@ def draw(analysis: Analysis, spec: FigureSpec) -> DrawnFigure:
         write_note(
             figure, f"N = {analysis.n_participants}. {marks}: participants. {bars}", analysis.synthetic
         )
-    return DrawnFigure(figure, bars)
+    return figure, bars
 
 
 def _bars_of(analysis: Analysis, shown: "_Shown") -> str:

@@ -53,7 +53,7 @@ def test_a_figure_has_the_means_and_intervals_of_the_table(within, between, cova
     assert shown >= {*within[:1], *between[:1]}
     seen = 0
     for spec in specs:
-        axes = draw(analysis, spec).figure.axes[0]
+        axes = draw(analysis, spec)[0].axes[0]
         labels = [text.get_text() for text in axes.get_xticklabels()]
         for container in axes.containers:
             line, _, (bars,) = container.lines
@@ -71,7 +71,7 @@ def test_a_figure_has_the_means_and_intervals_of_the_table(within, between, cova
 def test_a_figure_shows_participants_in_their_own_group_alone() -> None:
     analysis = analysed("obk", ["phase"], ["treatment"], [])
     (spec,) = figures_of(analysis)
-    axes = draw(analysis, spec).figure.axes[0]
+    axes = draw(analysis, spec)[0].axes[0]
     points = [line for line in axes.lines if line.get_marker() == "o" and line.get_markersize() == 2.6]
     drawn = sum(int(np.isfinite(np.asarray(line.get_ydata(), float)).sum()) for line in points)
     assert drawn == analysis.n_participants * 3
@@ -161,7 +161,7 @@ def test_texts_of_a_figure_are_whole_whatever_their_length() -> None:
     }
     named = replace(analysis, labels=Labels(factors, levels))
     for spec in figures_of(named):
-        assert_texts_are_whole(draw(named, spec).figure)
+        assert_texts_are_whole(draw(named, spec)[0])
 
 
 @pytest.mark.parametrize("n_rules", [1, 6])

@@ -29,7 +29,7 @@ def figure_of(first: tuple[str, str], second: tuple[str, str]):
     ]
     table = cell_table(pd.DataFrame(rows), "person", "score", ["$f$_x", "\\blur"])
     analysis = analyse_cells(table, name="odd", title="Odd", source="odd.csv", rating="score")
-    return draw(analysis, figures_of(analysis)[0]).figure
+    return draw(analysis, figures_of(analysis)[0])[0]
 
 
 @pytest.fixture

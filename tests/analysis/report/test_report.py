@@ -238,7 +238,7 @@ def test_data_are_plain(analysis) -> None:
 def test_the_note_under_a_figure_names_what_is_drawn(analysis: Analysis) -> None:
     """Figures of lines have no clouds."""
     for spec in figures_of(analysis):
-        figure = draw(analysis, spec).figure
+        figure = draw(analysis, spec)[0]
         has_clouds = bool(figure.axes[0].findobj(PolyCollection))
         assert ("clouds" in figure.get_supxlabel()) is has_clouds
         assert has_clouds is (spec.style == "points")
