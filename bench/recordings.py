@@ -24,8 +24,8 @@ closed: the opening in percent of the eye's width by the labels, by the detector
 are called doubtful, and how many percent of the pixels between the lids are saturated, there and in all
 frames. Needs the detector's environment, made at first use.
 
-characters: `stimuli bake recording` without labels on rendered faces. The closure of every recorded frame is
-compared with the one it was rendered at, in mm of the opening.
+characters: `stimuli bake recording` without labels on rendered faces and close-ups. The closure of every
+recorded frame is compared with the one it was rendered at, in mm of the opening.
 """
 
 import sys
@@ -280,17 +280,31 @@ GENERATED = (
     Recording(face="cedar-face@4", width_px=600, fps=60, seconds=2.2, onsets=(0.3, 1.2), noise=3, seed=22),
 )
 
+CLOSE_UPS = tuple(
+    Recording(
+        face=face, width_px=1440, fps=120, seconds=1.5, onsets=(0.1, 0.8), noise=2, crf=18, gaze_mm=gaze_mm
+    )
+    for face, gaze_mm in (("alder@11", -1.0), ("hazel@7", -1.0), ("cedar@7", -1.5))
+)
+"""The gaze makes up for corners of the eye that are detected too near to the nose."""
+
 
 def measure_characters() -> None:
-    for recording in GENERATED:
+    for recording in (*GENERATED, *CLOSE_UPS):
+        one_eye = recording in CLOSE_UPS
         with tempfile.TemporaryDirectory() as bare:
-            video, _ = recording.write(Path(bare))
-            baked = bake_recording(RecordingOrder(video, Path(bare) / "made"))
+            video = Path(bare) / "person.mp4"
+            if one_eye:
+                recording.write_close_up(video)
+            else:
+                recording.write(Path(bare))
+            baked = bake_recording(RecordingOrder(video, Path(bare) / "made", one_eye=one_eye))
         true_mm = load_atlas(SHIPPED / recording.face).declaration.opening_mm
         recorded = [k for k, level in enumerate(baked.levels) if level.first == level.second]
         off = (baked.measured.closures[recorded] - recording.closure[baked.frames.numbers]) * true_mm
         say(
-            f"{recording.face}, {recording.width_px} px, {recording.fps:g} fps, seed {recording.seed}: "
+            f"{recording.face}{', close-up' if one_eye else ''}, {recording.width_px} px, "
+            f"{recording.fps:g} fps, seed {recording.seed}: "
             f"closures {off.min():+.2f} to {off.max():+.2f} mm off, RMS {np.sqrt((off**2).mean()):.2f}; "
             f"widest opening {baked.opening_mm - true_mm:+.2f} mm; left-out frames at least "
             f"{np.nanmin(baked.left_out):.1f} dB"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.errors import InputError, counted
-from stimuli_builder.tracking.iris import IRIS_MM, measure_iris
+from stimuli_builder.tracking.iris import IRIS_MM, Iris, measure_iris
 from stimuli_builder.tracking.shapes import (
     CANTHI,
     EYE_POINTS,
@@ -218,6 +218,12 @@ WIDENED = 1.2
 within them, the iris is taken for a smaller circle."""
 
 
+def widened_iris(picture: Picture, eye: Points) -> Iris | None:
+    """Find the iris of an open eye (9, 2) beyond the detected lids."""
+    middle = eye.mean(0)
+    return measure_iris(picture, middle + WIDENED * (eye - middle))
+
+
 def iris_scale(pictures: Mapping[int, Picture], track: EyeTrack) -> float | None:
     """Pixels per mm if an iris is 11.7 mm wide; None where none is seen.
 
@@ -229,8 +235,7 @@ def iris_scale(pictures: Mapping[int, Picture], track: EyeTrack) -> float | None
     diameters = []
     for number, picture in pictures.items():
         for eye in track.eye_points(number):
-            middle = eye.mean(0)
-            iris = measure_iris(picture, middle + WIDENED * (eye - middle))
+            iris = widened_iris(picture, eye)
             if iris is not None:
                 diameters.append(iris.diameter)
     # The median, since in single frames the edge that is found is that of a lid or the pupil.

@@ -38,9 +38,7 @@ from stimuli_builder.characters.recording_levels import (
     BuiltLevel,
     MeasuredLevels,
     build_levels,
-    frames_by_motion,
     measure_levels,
-    moved_levels,
     moving_crop,
     near_both_sides,
     rebuilt_frame,
@@ -48,6 +46,7 @@ from stimuli_builder.characters.recording_levels import (
     without_strangers,
     write_recorded_character,
 )
+from stimuli_builder.characters.recording_lids import frames_by_motion, moved_levels
 from stimuli_builder.progress import frame_progress, step_progress
 from stimuli_builder.tracking.labelfree import TRAINED_ON, label_free_lesson, most_varied
 from stimuli_builder.tracking.learn import open_video, training_steps
@@ -62,6 +61,9 @@ FISSURE_MM = 30.0
 """Width of an eye where no iris is seen to give the scale."""
 EARLIER_S = 0.12
 """Without labels an eye may be shut so long before its last frame that is tracked as shut."""
+LATER_S, STAYS_OPEN = 0.1, 0.03
+"""Without labels an eye may go on opening so long after the frame that is tracked as open, while the tracked
+closure stays within this of it."""
 GAZES_LOOKED_AT = 12
 CHECKED_FRAMES = 40
 LEAST_LIKENESS = 0.5
@@ -303,7 +305,9 @@ def _bake(
     """Everything from the chosen opening to measured levels."""
     shut = opening.shut
     if order.track is None:
-        opening = replace(opening, shut=_earlier(track, shut, round(EARLIER_S * info.fps)))
+        earlier = _earlier(track, shut, round(EARLIER_S * info.fps))
+        later = _later(track, opening.opened, round(LATER_S * info.fps))
+        opening = replace(opening, shut=earlier, opened=later)
     with frame_progress() as progress:
         task = progress.add_task("reading the blink", total=opening.opened + 1)
         pictures = read_selected(
@@ -365,6 +369,14 @@ def _earlier(track: EyeTrack, shut: int, most: int) -> int:
     return first + int(lost[-1]) + 1 if len(lost) else first
 
 
+def _later(track: EyeTrack, opened: int, most: int) -> int:
+    """The last of up to so many frames after the open one in which the eyes stay as open."""
+    closure = track.closures.mean(1)[opened : opened + most + 1]
+    # Where the eyes are lost the comparison is false, too.
+    ends = np.flatnonzero(~(closure <= closure[0] + STAYS_OPEN))
+    return opened + (int(ends[0]) if len(ends) else len(closure)) - 1
+
+
 def _scale(
     order: RecordingOrder, track: EyeTrack, pictures: Mapping[int, Picture], opening: Opening
 ) -> float:
@@ -387,7 +399,7 @@ ROUGH_DB = 33.0
 REFLECTION_MM2 = 0.3
 BRIGHT_CODE = 235
 SMALL_EYE_PX = 150
-UNLABELED_MM, UNLABELED_OPEN_MM = {1: 1.2, 2: 0.5}, {1: 2.6, 2: 0.7}
+UNLABELED_MM, UNLABELED_OPEN_MM = {1: 0.4, 2: 0.3}, {1: 0.9, 2: 0.5}
 """Largest errors of openings without labels, and of the widest one, by the number of eyes
 (docs/explanation/tracking-accuracy.md)."""
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import isotonic_regression
 
-from experiments.errors import InputError
 from stimuli_builder.characters.atlas import write_level_video
 from stimuli_builder.characters.declaration import (
     Declaration,
@@ -25,7 +24,6 @@ from stimuli_builder.characters.recording import (
     StillFrames,
     Values,
     decibels,
-    distinct_frames,
     gray_codes,
 )
 from stimuli_builder.tracking.mesh import reduce_picture
@@ -237,184 +235,7 @@ def rebuilt_frame(frames: StillFrames, k: int, crop: tuple[int, int, int, int]) 
     return FramePair(before, after).between(float((closure - low) / (high - low))), recorded
 
 
-# Openings without labels: how far the skin at the margin of the upper lid moves.
-#
-# A detector draws the lids of shut and of wide eyes in the wrong place, by up to a fifth of the opening. The
-# motion of the skin between two pictures has no such error, and an eye is shut where its lid is lowest.
-
-LID_ROWS = np.linspace(-0.25, 0.15, 81)
-"""Rows of points over both lids of the shut eye, from the middle of its detected lids, in eye widths."""
-LID_COLUMNS = np.linspace(-0.1, 0.1, 21)
-MARGIN_ROWS = 5
-MARGIN_SHARE = 0.97
-"""The skin moves nearly as far as the margin over so many rows above it; below lie lashes and the eye."""
-BELOW_MARGIN = (0.02, 0.05)
-"""What moves with the upper lid so far below its margin touches it: lashes and the lower lid."""
-TOUCHING = 0.01
-"""Lids that are apart by less than this share of the opening are taken to touch."""
-MIN_FRAMES = 2
-"""Of an opening, after the open one: the least that shows a lid on its way."""
-RIM_MM = 0.25
-"""Lids that touch at their lashes have met behind them: so much of the motion closes no gap that is seen."""
-NOT_FOLLOWED = "the motion of the lids cannot be followed in the blink; label frames by hand"
-
-
-class LidMotion:
-    """Rows of points followed through aligned gray pictures, from picture to picture."""
-
-    def __init__(self, pictures: Sequence[Picture]) -> None:
-        self._pictures = pictures
-        self._flows: dict[tuple[int, int], Flow] = {}
-
-    def places(self, start: int, grid: Points | Flow) -> NDArray[np.float32]:
-        """Where a grid (rows, columns, 2) on picture `start` is in each: (pictures, rows, columns, 2)."""
-        places = {start: np.asarray(grid, np.float32)}
-        for step, stop in ((-1, -1), (1, len(self._pictures))):
-            for number in range(start + step, stop, step):
-                before = places[number - step]
-                flow = self._flow(number - step, number)
-                x, y = np.moveaxis(before, -1, 0)
-                places[number] = before + cv2.remap(
-                    flow, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-                )
-        return np.array([places[number] for number in range(len(self._pictures))])
-
-    def _flow(self, one: int, other: int) -> Flow:
-        if (one, other) not in self._flows:
-            self._flows[one, other] = optical_flow(self._pictures[one], self._pictures[other])
-        return self._flows[one, other]
-
-
-@dataclass(frozen=True, eq=False)
-class LidTravel:
-    """How far the upper lids are above their lowest place, in pixels, as means of the eyes.
-
-    Attributes
-    ----------
-    upper, below : float64 arrays (pictures,)
-        Of the margin, and of what is next to it below.
-    drift : float64 array (pictures,)
-        Of the margin, followed from shut to open and back: how far it is from its place on the way there.
-    """
-
-    upper: Values
-    below: Values
-    drift: Values
-
-
-def lid_travel(pictures: Sequence[Picture], opened: Points, shut: Points, start: int) -> LidTravel:
-    """Follow the skin at the margins of the upper lids.
-
-    Parameters
-    ----------
-    pictures : sequence of uint8 array (h, w)
-        Aligned, gray; the first is the open one.
-    opened, shut : float64 array (9 * eyes, 2)
-        Detected points in the first picture, and in picture `start`, whose eyes are nearly shut.
-
-    Raises
-    ------
-    InputError
-        No upper lid rises over a lower one that stays behind.
-    """
-    upper, below, drift = [], [], []
-    for eye, shut_eye in zip(opened.reshape(-1, EYE_POINTS, 2), shut.reshape(-1, EYE_POINTS, 2), strict=True):
-        along, down, width = eye_axis(eye)
-        middle = eye[list(CANTHI)].mean(0)
-        last = np.array(pictures[0].shape[1::-1])
-        left, top = np.clip((middle - 0.8 * width).astype(int), 0, last)
-        right, bottom = np.clip((middle + 0.8 * width).astype(int), 0, last)
-        motion = LidMotion([np.ascontiguousarray(picture[top:bottom, left:right]) for picture in pictures])
-        center = (shut_eye[[2, 3]].mean(0) + shut_eye[7]) / 2 - [left, top]
-        deepest = start
-        # The second time from the picture in which the lid is lowest, about where it meets the other.
-        for _ in range(2):
-            grid = center + width * (LID_ROWS[:, None, None] * down + LID_COLUMNS[:, None] * along)
-            places = motion.places(deepest, grid)
-            moved = np.median((places - grid) @ down, axis=2)
-            highest = int(np.argmin(moved[0]))
-            if not moved[0, highest] < 0:
-                raise InputError(NOT_FOLLOWED)
-            meets = highest + int(np.argmax(moved[0, highest:] > 0.5 * moved[0, highest]))
-            last_row = int(np.flatnonzero(moved[0] <= MARGIN_SHARE * moved[0, highest])[-1])
-            margin = slice(max(highest, last_row - MARGIN_ROWS + 1), last_row + 1)
-            under = LID_ROWS - LID_ROWS[meets]
-            touched = (under >= BELOW_MARGIN[0]) & (under <= BELOW_MARGIN[1])
-            if not touched.any():
-                raise InputError(NOT_FOLLOWED)
-            lower = moved[:, touched].mean(1)
-            rows = moved[:, margin].mean(1)
-            deepest = int(np.argmax(rows))
-            center = center + (LID_ROWS[meets] * width + moved[deepest, meets]) * down
-        back = motion.places(0, places[0, margin]) - places[:, margin]
-        drift.append(np.median(back @ down, axis=2).mean(1))
-        upper.append(rows[deepest] - rows)
-        below.append(lower[deepest] - lower)
-    return LidTravel(*(np.mean(one, axis=0) for one in (upper, below, drift)))
-
-
-def moved_openings(travel: LidTravel, px_per_mm: float) -> tuple[Values, int]:
-    """Opening of each picture in pixels, and the last one that is shut."""
-    upper, below = travel.upper, travel.below
-    # From the deepest on without a gap: what lies far from the shut eye may look alike.
-    touching = int(np.argmin(upper))
-    while touching and upper[touching - 1] - below[touching - 1] <= TOUCHING * upper[0]:
-        touching -= 1
-    # Pressed lids rise together. That part counts less and less until the upper one has risen as far again.
-    together = max(float(upper[touching]), 1e-6)
-    apart = np.maximum(upper - together * np.clip(2 - upper / together, 0, 1), 0.0)
-    rim = RIM_MM * px_per_mm
-    return np.asarray(apart - rim * (1 - np.exp(-apart / rim))), touching
-
-
-@dataclass(frozen=True, eq=False)
-class MotionOpenings:
-    """Openings by the motion of the lids.
-
-    Attributes
-    ----------
-    frames : StillFrames
-        The distinct frames from open to shut, with these closures.
-    opening_px : float
-        Of the open eye, in pixels of the region.
-    error_px : float64 array (n,)
-        Of the frames' openings: half of the drift from shut to open and back.
-    """
-
-    frames: StillFrames
-    opening_px: float
-    error_px: Values
-
-
-def frames_by_motion(frames: StillFrames, start: int, px_per_mm: float) -> MotionOpenings:
-    """Measure the openings of frames and keep those that differ.
-
-    Parameters
-    ----------
-    frames : StillFrames
-        All frames from the open one back to before the last shut one.
-    start : int
-        The frame that the track calls shut.
-    px_per_mm : float
-        Of the region.
-
-    Raises
-    ------
-    InputError
-        The lids do not move as in an opening.
-    """
-    pictures = [gray_codes(picture) for picture in frames.pictures]
-    travel = lid_travel(pictures, frames.points[0], frames.points[start], start)
-    opening, touching = moved_openings(travel, px_per_mm)
-    if not opening[0] > 0 or touching < MIN_FRAMES:
-        raise InputError(NOT_FOLLOWED)
-    closures = 1 - opening[: touching + 1] / opening[0]
-    distinct = distinct_frames(frames.only(range(touching + 1), closures), closures)
-    errors = [travel.drift[frames.numbers.index(number)] / 2 for number in distinct.numbers]
-    return MotionOpenings(distinct, float(opening[0]), np.array(errors))
-
-
-# The opening of every level, measured by the tracker or by the motion of its lids.
+# The opening of every level, measured by the tracker; without labels, see `recording_lids`.
 
 STRICT = 0.02
 """Share of a closure that comes from its track, so that no two levels have the same."""
@@ -472,20 +293,6 @@ def tracked_openings(
         openings.append(np.nan if fitted.distances is None else float(fitted.distances.mean()))
         advance()
     return np.array(openings)
-
-
-def moved_levels(motion: MotionOpenings, levels: Sequence[BuiltLevel], px_per_mm: float) -> MeasuredLevels:
-    """Closures of levels by the motion of the lids.
-
-    Parameters
-    ----------
-    px_per_mm : float
-        Of the region.
-    """
-    closures = np.round([level.track_closure for level in levels], 5)
-    errors = np.interp(closures, motion.frames.closures, motion.error_px)
-    scale = motion.frames.region.scale
-    return MeasuredLevels(closures, errors / px_per_mm, motion.opening_px / scale)
 
 
 def measure_levels(levels: Sequence[BuiltLevel], seen: Values, video_px_per_mm: float) -> MeasuredLevels:

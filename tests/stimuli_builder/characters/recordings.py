@@ -4,6 +4,7 @@ import csv
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 
 import cv2
@@ -167,11 +168,18 @@ class Recording:
     def write(self, folder: Path, name: str = "person") -> tuple[Path, Path]:
         """Write video and track; returns both paths."""
         video, track = folder / f"{name}.mp4", folder / f"{name}.csv"
-        with VideoWriter(video, self.fps, self.size_px, crf=self.crf) as writer:
-            for picture in self.pictures():
-                writer.write(picture)
+        write_video(video, self.pictures(), self.fps, self.crf)
         self.write_track(track)
         return video, track
+
+    def write_close_up(self, path: Path) -> Path:
+        """Write a video of 56 x 42 mm about the image-left eye."""
+        middle_x, middle_y = self.regions.pupils_px[0]
+        width, height = (2 * round(half_mm * self.regions.px_per_mm) for half_mm in (28, 21))
+        x = max(0, round(middle_x) - width // 2)
+        y = min(max(0, round(middle_y) - height // 2), self.size_px[1] - height)
+        shown = (picture[y : y + height, x : x + width] for picture in self.pictures())
+        return write_video(path, shown, self.fps, self.crf)
 
     def write_track(self, path: Path) -> Path:
         with path.open("w", newline="") as stream:
@@ -185,6 +193,15 @@ class Recording:
                     [frame, f"{frame / self.fps:.6f}", *cells, 1, 1, 0.5, *[0.5] * 18, "tracked", ""]
                 )
         return path
+
+
+def write_video(path: Path, pictures: Iterator[NDArray[np.uint8]], fps: float, crf: int) -> Path:
+    """Encode pictures of one size."""
+    first = next(pictures)
+    with VideoWriter(path, fps, (first.shape[1], first.shape[0]), crf=crf) as writer:
+        for picture in chain([first], pictures):
+            writer.write(np.ascontiguousarray(picture))
+    return path
 
 
 def _draw_glasses(picture: NDArray[np.float32], scale: float) -> None:
