@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.read.number_columns import MISSING_MARKS, holds_numbers
+from analysis.read.reading import OF_AN_EXPORT, rows_with_names, said_of_mixed
 from analysis.read.text_table import EMPTY, read_text_table
 from analysis.read.wide import wide_hint
 from experiments.columns.column import OLD_ORDER
@@ -187,6 +188,10 @@ def guess_roles(path: Path) -> TableGuess:
     columns = tuple(_described(name, texts[name], numbers[name], roles.get(name, "")) for name in texts)
     hint = "" if command else wide_hint(table.header)
     decisions = [*table.decisions, *([hint.removeprefix("; ")] if hint else [])]
+    # Otherwise the command that is proposed would only refuse the table.
+    is_export = {*table.header} >= OF_AN_EXPORT
+    if command and is_export and (mixed := said_of_mixed(table, rows_with_names(table), list(roles))):
+        decisions.append(f"the command below refuses this table as it is: {mixed}")
     return TableGuess(len(table.columns), columns, command, tuple(decisions))
 
 

@@ -116,11 +116,11 @@ def report_visits(table: TextTable, keep: NDArray[np.bool_]) -> None:
         )
 
 
-_OF_AN_EXPORT = frozenset({"kind", "trial_index", "run", "verdict", "excluded"})
+OF_AN_EXPORT = frozenset({"kind", "trial_index", "run", "verdict", "excluded"})
 """Columns that only the server's own exports have together."""
 
 
-def rows_with_names(table: TextTable, marks: Set[str] = _OF_AN_EXPORT) -> NDArray[np.bool_]:
+def rows_with_names(table: TextTable, marks: Set[str] = OF_AN_EXPORT) -> NDArray[np.bool_]:
     """Rows (n,) that need a name in each column used: in an export those that count, else all.
 
     An instructed answer or a motion check has no clip, so that its row has no level of any factor.
@@ -134,7 +134,7 @@ def answers_that_count(
     keep: NDArray[np.bool_],
     what: str,
     used: Sequence[str],
-    marks: Set[str] = _OF_AN_EXPORT,
+    marks: Set[str] = OF_AN_EXPORT,
 ) -> NDArray[np.bool_]:
     """Of the rows to `keep` (n,) those that count, if the table is an export of the server.
 
@@ -164,12 +164,15 @@ def repeats_said(number: int, of: str) -> str:
 
 
 def refuse_mixed(table: TextTable, keep: NDArray[np.bool_], used: Sequence[str]) -> None:
-    """Refuse an export whose rows to `keep` (n,) have no common mean: of several scales, series or origins.
+    """Refuse an export whose rows to `keep` (n,) have no common mean (`said_of_mixed`) as one InputError."""
+    if said := said_of_mixed(table, keep, used):
+        raise InputError(f"{table.source}: {said}")
 
-    Raises
-    ------
-    InputError
-        Naming what is mixed, and how to get one of it.
+
+def said_of_mixed(table: TextTable, keep: NDArray[np.bool_], used: Sequence[str]) -> str | None:
+    """What is mixed in the rows to `keep` (n,) of an export, and what to do: scales, series or origins.
+
+    Columns that are `used` separate or compare what they mix. None where the rows have a common mean.
     """
     for column, one, advice in _APART:
         if column in table.columns.columns and column not in used:
@@ -177,8 +180,8 @@ def refuse_mixed(table: TextTable, keep: NDArray[np.bool_], used: Sequence[str])
             # Answers of a pilot may be pooled with those of participants; simulated ones are no person's.
             mixed = "simulated" in values if column == "run_origin" else True
             if mixed and len(values) > 1:
-                there = f"{len(values)} ({', '.join(values)})"
-                raise InputError(f"{table.source}: expected answers {one}, got {there}; {advice}")
+                return f"expected answers {one}, got {len(values)} ({', '.join(values)}); {advice}"
+    return None
 
 
 _APART = (
@@ -187,7 +190,12 @@ _APART = (
         "on one scale",
         "keep the rows of one, or use `analysis run`, or --by scale (opinion, agreement)",
     ),
-    ("data_series", "of one data series", "export one with `server export STUDY --series N`"),
+    (
+        "data_series",
+        "of one data series",
+        "export one with `server export STUDY --series N`, or, to pool them on purpose, remove the column "
+        "data_series",
+    ),
     ("run_origin", "of one origin", "export one with `server export STUDY --origin participant`"),
 )
 """Columns of an export whose values must not be pooled, what is expected, and what to do."""

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from analysis.pairs.comparisons import read_comparisons
+from analysis.read.column_roles import guess_roles
 from analysis.read.long_csv import read_long_table
 from analysis.read.model_csv import read_model_input
 from analysis.thresholds.answers import read_answers
@@ -169,3 +170,27 @@ def test_a_pilot_may_be_pooled_with_the_study(export: Path) -> None:
     lines = [f"{header},run_origin", *(f"{row},{origins[n % 2]}" for n, row in enumerate(rows))]
     export.write_text("\n".join(lines) + "\n", encoding="utf-8")
     assert len(read_long_table(export, "participant", "response", ["face"]).rows) == 4
+
+
+def test_series_are_pooled_on_purpose_without_their_column(export: Path) -> None:
+    """The guide to changing a running study says how, and so does the message."""
+    header, *rows = export.read_text(encoding="utf-8").splitlines()
+    lines = [f"{header},data_series", *(f"{row},{1 + n % 2}" for n, row in enumerate(rows))]
+    export.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    with pytest.raises(InputError, match="to pool them on purpose, remove the column data_series"):
+        read_long_table(export, "participant", "response", ["face"])
+    export.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    assert len(read_long_table(export, "participant", "response", ["face"]).rows) == 4
+
+
+@pytest.mark.parametrize(("scales", "is_refused"), [(("calm", "eerie"), True), (("calm", "calm"), False)])
+def test_proposed_command_is_announced_where_it_refuses_the_table(
+    export: Path, scales: tuple[str, str], is_refused: bool
+) -> None:
+    header, *rows = export.read_text(encoding="utf-8").splitlines()
+    lines = [f"{header},definition_sha256,scale", *(f"{row},0,{scales[n % 2]}" for n, row in enumerate(rows))]
+    export.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    guess = guess_roles(export)
+    assert guess.command == "anova"
+    said = "the command below refuses this table as it is: expected answers on one scale, got 2 (calm, eerie)"
+    assert any(said in line for line in guess.decisions) == is_refused
