@@ -101,7 +101,7 @@ SENTENCES = {
     "pt": "Alguns clipes curtos mostram pontos que cintilam.",
     "zh": "部分短片会显示闪烁的圆点。",
 }
-"""A sentence for a consent text; English and German are reviewed by the authors, the others await review."""
+"""A sentence for a consent text; only English is reviewed, the others await review."""
 
 
 def mentions_flicker(text: str, language: str) -> bool:

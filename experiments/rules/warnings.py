@@ -45,7 +45,7 @@ def follow_a_cycle(given: Sequence[GivenAnswer], length: int) -> bool:
 
 
 # Texts of the warnings in the languages of the page. They apply if a rule has no `text`.
-# English and German are reviewed; the others await review by a native speaker.
+# Only English is reviewed; the others await review by a native speaker.
 
 HEADINGS = {
     "en": "A word in between",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from experiments.command_groups import command_group
-from experiments.errors import InputError
+from experiments.errors import InputError, counted
 from stimuli_builder.characters.atlas import load_retired, restore
 from stimuli_builder.clips.characters import SHIPPED_FOLDER, geometry, shipped_names
 
@@ -29,12 +29,18 @@ def _bake() -> None:
 
 
 @character_app.command("list")
-def list_characters() -> None:
-    """List the installed characters, and those of earlier releases.
+def list_characters(
+    every: Annotated[
+        bool, typer.Option("--all", help="Also list the characters of earlier releases, with their origin.")
+    ] = False,
+) -> None:
+    """List the installed characters, and count those of earlier releases.
 
     Examples:
 
       stimuli character list
+
+      stimuli character list --all
     """
     names = shipped_names()
     for name in names:
@@ -43,9 +49,16 @@ def list_characters() -> None:
         typer.echo(
             f"{name:16} {shape.size_px[0]} x {shape.size_px[1]} px, opens {shape.opening_mm:g} mm, {lower}"
         )
-    for name, retired in load_retired().items():
-        if name not in names:
-            typer.echo(f"{name:16} not installed: `stimuli character fetch {name}` ({retired.label})")
+    earlier = {name: retired for name, retired in load_retired().items() if name not in names}
+    if every:
+        for name, retired in earlier.items():
+            typer.echo(f"{name:16} not installed ({retired.label})")
+    if earlier:
+        listed = "" if every else "; `stimuli character list --all` lists them"
+        typer.echo(
+            f"{counted(len(earlier), 'character')} of earlier releases can be restored: "
+            f"`stimuli character fetch NAME`{listed}"
+        )
 
 
 @character_app.command("fetch")

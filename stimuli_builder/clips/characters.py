@@ -33,7 +33,7 @@ def character_folder(name: str, beside: Path | None = None) -> Path:
     if name in load_retired():
         raise InputError(
             f"character '{name}' is no longer shipped. Restore it for existing studies with `stimuli "
-            f"character fetch {name}`; for a new study use another, such as character = 'alder@8'"
+            f"character fetch {name}`; for a new study use another, such as '{_successor(name)}'"
         )
     if folder.is_dir():
         raise InputError(
@@ -43,6 +43,12 @@ def character_folder(name: str, beside: Path | None = None) -> Path:
         f"there is no character '{name}': it is neither shipped nor a "
         f"folder{did_you_mean(name, shipped_names())}"
     )
+
+
+def _successor(name: str) -> str:
+    """The newest shipped character of the same name; of names that left, one with a moving lower lid."""
+    of_name = [one for one in shipped_names() if one.partition("@")[0] == name.partition("@")[0]]
+    return max(of_name, key=lambda one: int(one.partition("@")[2] or 1), default="alder@8")
 
 
 def find_character(name: str, beside: Path | None = None) -> Character:

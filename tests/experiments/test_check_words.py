@@ -26,7 +26,7 @@ def test_no_word_is_missing_doubled_or_left_in_english(language: str) -> None:
     assert WORDS[language]["digit"].choices == tuple(DIGITS)
 
 
-@pytest.mark.parametrize("language", sorted(set(WORDS) - {"en", "de"}))
+@pytest.mark.parametrize("language", sorted(set(WORDS) - {"en"}))
 def test_what_nobody_has_read_says_so(language: str) -> None:
     text = Path(__file__).parents[2] / f"experiments/check_words/{language}.toml"
     assert "Unreviewed" in text.read_text(encoding="utf-8").partition("[")[0]

@@ -18,7 +18,8 @@ from stimuli_builder.characters.atlas import (
     next_version,
     restore,
 )
-from stimuli_builder.clips.characters import find_character
+from stimuli_builder.characters.cli import list_characters
+from stimuli_builder.clips.characters import find_character, geometry, shipped_names
 
 FOLDER = "pictures/old"
 OPENING_MM = {
@@ -190,3 +191,22 @@ def test_every_retired_character_is_in_this_clones_history(tmp_path: Path, name:
     atlas = load_atlas(restore(name, None, tmp_path / name))
     assert atlas.fingerprint() == known.sha256
     assert atlas.declaration.opening_mm == OPENING_MM[name]
+
+
+def test_the_list_is_of_what_is_installed(capsys: pytest.CaptureFixture[str]) -> None:
+    list_characters()
+    shown = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in shown[:-1]] == list(shipped_names())
+    earlier = set(load_retired()) - set(shipped_names())
+    assert shown[-1].startswith(f"{len(earlier)} characters of earlier releases can be restored")
+    list_characters(every=True)
+    everything = capsys.readouterr().out.splitlines()
+    assert {line.split()[0] for line in everything[:-1]} == {*shipped_names(), *earlier}
+
+
+@pytest.mark.parametrize(
+    ("left", "next_of_it"), [("alder-face", r"alder-face@\d+"), ("photorealistic", "alder@8")]
+)
+def test_a_character_that_left_is_answered_with_the_newest_of_its_name(left: str, next_of_it: str) -> None:
+    with pytest.raises(InputError, match=f"for a new study use another, such as '{next_of_it}'"):
+        geometry(left)
