@@ -1,7 +1,7 @@
 """Motion checks: short clips whose answer is visible through motion only, and their questions.
 
 The words of each page language are in `check_words/TAG.toml`, found by their names. Only English is reviewed;
-every other file says at its top that it awaits review, until `frontend/src/i18n/reviewed.ts` names its reader.
+every other file says at its top that it awaits review. `frontend/src/i18n/reviewed.ts` names the readers.
 """
 
 import tomllib

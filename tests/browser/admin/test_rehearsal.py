@@ -31,6 +31,33 @@ def look(dashboard: Dashboard, name: str) -> None:
         page.set_viewport_size({"width": 1280, "height": 800})
 
 
+@pytest.mark.parametrize("typed", ["-3", "61", "2.5"])
+def test_a_number_out_of_range_is_refused_and_stays_as_typed(dashboard: Dashboard, typed: str) -> None:
+    """-3 people became one."""
+    page = dashboard.open("/studies/short/rehearsal")
+    people = page.get_by_label("Simulated people")
+    people.fill(typed)
+    people.blur()
+    expect(people).to_have_value(typed)
+    expected = f"Expected a whole number from 1 to 60, got {typed}. Change it to continue."
+    expect(page.get_by_text(expected)).to_be_visible()
+    expect(page.get_by_role("button", name="Rehearse")).to_be_disabled()
+
+    page = dashboard.open("/studies/short/links")
+    page.get_by_text("One person each").click()
+    many = page.get_by_label("How many")
+    many.fill("0")
+    many.blur()
+    expect(page.get_by_text("Expected a whole number from 1 to 5000, got 0.")).to_be_visible()
+    expect(page.get_by_role("button", name="Create links")).to_be_disabled()
+
+    page = dashboard.open("/studies/short/settings")
+    quota = page.get_by_label("Close after this many complete runs")
+    quota.fill("-1")
+    quota.blur()
+    expect(page.get_by_text("Expected a whole number of 1 or more, got -1.")).to_be_visible()
+
+
 def test_a_study_is_rehearsed_by_one_button(dashboard: Dashboard) -> None:
     dashboard.complaints.clear()
     page = dashboard.open("/studies/short/rehearsal")

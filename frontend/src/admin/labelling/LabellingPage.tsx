@@ -1,10 +1,11 @@
 /** Landmarks on frames of a video, for `stimuli track --labels`. The video stays on this computer. */
-import { Alert, Badge, Button, Card, Group, NumberInput, SegmentedControl, Stack, Text, Title } from "@mantine/core";
+import { Alert, Badge, Button, Card, Group, SegmentedControl, Stack, Text, Title } from "@mantine/core";
 import { useState } from "react";
 import { FEWEST_FRAMES } from "../../labelling/label-file";
 import { at } from "../../labelling/points";
 import { FRAMES_BEFORE_PROPOSALS } from "../../labelling/propose";
 import { ConfirmButton } from "../ui/ConfirmButton";
+import { faultOf, type Typed, WholeNumber } from "../ui/WholeNumber";
 import { OpenFile } from "./OpenFile";
 import { Stage } from "./Stage";
 import { useLabelling } from "./useLabelling";
@@ -192,19 +193,12 @@ function Frames({ work }: { work: Labelling }) {
 
 /** Frames the choice has missed, such as one in the middle of a blink. */
 function AddFrame({ work }: { work: Labelling }) {
-  const [number, setNumber] = useState<number | string>("");
+  const [number, setNumber] = useState<Typed>("");
+  const frames = { min: 0, max: (work.video?.frameCount ?? 1) - 1 };
   return (
     <Group gap="xs" mt="sm" align="end">
-      <NumberInput
-        label="Another frame"
-        w={130}
-        min={0}
-        max={(work.video?.frameCount ?? 1) - 1}
-        allowDecimal={false}
-        value={number}
-        onChange={setNumber}
-      />
-      <Button variant="default" disabled={typeof number !== "number"} onClick={() => work.goTo(Number(number))}>
+      <WholeNumber label="Another frame" w={130} {...frames} optional value={number} onChange={setNumber} />
+      <Button variant="default" disabled={faultOf(number, frames) !== null} onClick={() => work.goTo(Number(number))}>
         Add frame
       </Button>
     </Group>

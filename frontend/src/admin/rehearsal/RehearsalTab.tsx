@@ -1,20 +1,6 @@
 /** The dress rehearsal: simulated people in a sandbox, and what they would leave behind. */
 
-import {
-  Anchor,
-  Card,
-  Code,
-  Group,
-  SegmentedControl,
-  Table,
-  Text,
-  Title,
-  Alert,
-  Button,
-  NumberInput,
-  Progress,
-  Stack,
-} from "@mantine/core";
+import { Anchor, Card, Code, Group, SegmentedControl, Table, Text, Title, Alert, Button, Progress, Stack } from "@mantine/core";
 import { type ReactNode, useState } from "react";
 import { type Schemas, api, unwrap, useMay } from "../api";
 import { DataTable } from "../ui/DataTable";
@@ -23,6 +9,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useParams } from "@tanstack/react-router";
 import { Answer } from "../ui/Answer";
 import { useChange } from "../ui/useChange";
+import { faultOf, type Typed, WholeNumber } from "../ui/WholeNumber";
 
 // What a rehearsal showed, a card each.
 
@@ -165,22 +152,23 @@ function Columns({ result: { columns } }: Props) {
 
 type Rehearsal = Schemas["RehearsalOut"];
 
-const MAX_PEOPLE = 60;
+const PEOPLE = { min: 1, max: 60 };
 const isUnderWay = ({ status }: Rehearsal): boolean => status === "queued" || status === "running";
 
 export function RehearsalTab() {
   const { study = "" } = useParams({ strict: false });
   const path = { params: { path: { study } } };
   const mayBegin = useMay(study, "run");
-  const [participants, setParticipants] = useState(8);
+  const [participants, setParticipants] = useState<Typed>(8);
   const latest = useQuery({
     queryKey: ["rehearsal", study],
     queryFn: () => unwrap(api.GET("/api/admin/studies/{study}/rehearsals/latest", path)),
     refetchInterval: ({ state }) => (state.data && isUnderWay(state.data) ? 1_000 : false),
   });
-  const begin = useChange(() => unwrap(api.POST("/api/admin/studies/{study}/rehearsals", { ...path, body: { participants, seed: 1 } })), {
-    touches: [["rehearsal", study]],
-  });
+  const begin = useChange(
+    () => unwrap(api.POST("/api/admin/studies/{study}/rehearsals", { ...path, body: { participants: Number(participants), seed: 1 } })),
+    { touches: [["rehearsal", study]] },
+  );
   const busy = latest.data ? isUnderWay(latest.data) : false;
   return (
     <Stack>
@@ -194,15 +182,12 @@ export function RehearsalTab() {
         </Text>
         {mayBegin && (
           <Group align="end">
-            <NumberInput
-              label="Simulated people"
-              min={1}
-              max={MAX_PEOPLE}
-              w={150}
-              value={participants}
-              onChange={(value) => setParticipants(Math.min(MAX_PEOPLE, Math.max(1, Math.round(Number(value) || 1))))}
-            />
-            <Button onClick={() => begin.mutate(undefined)} loading={begin.isPending} disabled={busy}>
+            <WholeNumber label="Simulated people" {...PEOPLE} w={150} value={participants} onChange={setParticipants} />
+            <Button
+              onClick={() => begin.mutate(undefined)}
+              loading={begin.isPending}
+              disabled={busy || faultOf(participants, PEOPLE) !== null}
+            >
               Rehearse
             </Button>
           </Group>

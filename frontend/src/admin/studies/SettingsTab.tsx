@@ -1,10 +1,11 @@
-import { Card, Text, Title, List, Button, NavLink, NumberInput, Select, SimpleGrid, Stack, Switch, TextInput, Anchor } from "@mantine/core";
+import { Card, Text, Title, List, Button, NavLink, Select, SimpleGrid, Stack, Switch, TextInput, Anchor } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { api, type Schemas, unwrap, studyQuery } from "../api";
 import { Answer, onDemand } from "../ui/Answer";
 import { counted, when } from "../ui/format";
 import { useState } from "react";
 import { useChange } from "../ui/useChange";
+import { faultOf, type Typed, WholeNumber } from "../ui/WholeNumber";
 import { Address, addressFor, RECRUITER_NAMES, SigningButton } from "./recruiting";
 import { Link, useParams, useSearch } from "@tanstack/react-router";
 
@@ -120,9 +121,11 @@ function useSettings({ summary, recruiter }: Schemas["StudyDetail"]) {
   );
 }
 
+const QUOTA = { min: 1, optional: true };
+
 function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
   const [paused, setPaused] = useState(detail.summary.paused);
-  const [quota, setQuota] = useState<number | string>(detail.summary.quota ?? "");
+  const [quota, setQuota] = useState<Typed>(detail.summary.quota ?? "");
   const save = useSettings(detail);
   return (
     <Card withBorder>
@@ -131,8 +134,19 @@ function Running({ detail }: { detail: Schemas["StudyDetail"] }) {
           Running
         </Title>
         <Switch label="Paused: no new participants" checked={paused} onChange={(event) => setPaused(event.currentTarget.checked)} />
-        <NumberInput label="Close after this many complete runs" placeholder="no limit" min={1} value={quota} onChange={setQuota} w={280} />
-        <Button onClick={() => save.mutate({ paused, quota: quota === "" ? null : Number(quota) })} loading={save.isPending}>
+        <WholeNumber
+          label="Close after this many complete runs"
+          placeholder="no limit"
+          {...QUOTA}
+          value={quota}
+          onChange={setQuota}
+          w={280}
+        />
+        <Button
+          onClick={() => save.mutate({ paused, quota: quota === "" ? null : Number(quota) })}
+          loading={save.isPending}
+          disabled={faultOf(quota, QUOTA) !== null}
+        >
           Save
         </Button>
       </Stack>

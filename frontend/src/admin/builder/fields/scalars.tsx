@@ -61,7 +61,6 @@ export function Numeric(props: FieldProps) {
       required={required}
       classNames={NARROW}
       placeholder={shown(fallback)}
-      allowDecimal={!editor.whole}
       {...(editor.maximum === undefined ? {} : { max: editor.maximum })}
       {...(editor.minimum === undefined ? {} : { min: editor.minimum })}
       clampBehavior="none"
