@@ -319,5 +319,5 @@ def readyz(services: ServicesDep) -> Health:
     with services.database.read() as session:
         clip = newest_clip(session)
     if problem := services.clips.problem(clip):
-        raise NotReady(f"Clips cannot be read: {problem}; Run `server doctor` for advice.")
+        raise NotReady(f"Clips cannot be read: {problem}; run `server doctor` for advice.")
     return Health(status="ready")

@@ -121,7 +121,7 @@ def downgrade() -> None:
     opened = [row for row in (_opened(wrapping, person) for person in people) if row is not None]
     if len(opened) < len(people):
         raise CommandError(
-            f"{len(people) - len(opened)} recruiters' ids do not open with this secret key and would be lost; "
+            f"{len(people) - len(opened)} recruiters' IDs do not open with this secret key and would be lost; "
             "run: server database rewrap OLD_KEY_FILE"
         )
     op.drop_table("recruiter_identities")

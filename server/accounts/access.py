@@ -210,7 +210,7 @@ Viewer = Annotated[Identity, Depends(_Access("viewer", "read"))]
 Exporter = Annotated[Identity, Depends(_Access("viewer", "export"))]
 """May download data."""
 PersonalReader = Annotated[Identity, Depends(_Access("viewer", "personal"))]
-"""May look at single persons: their answers, recruiters' ids and devices. Scope `read` alone does not do."""
+"""May look at single persons: their answers, recruiters' IDs and devices. Scope `read` alone does not do."""
 ReportReader = Annotated[Identity, Depends(_Access("viewer", "export", "personal"))]
 """May open the files of reports, which hold rows of single persons."""
 WRITER = _Access("viewer", "write")

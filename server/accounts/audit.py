@@ -205,7 +205,10 @@ def _handler(address: str) -> SysLogHandler:
     elif Path(listening.host).exists():
         handler = _Handler(listening.host, facility=SysLogHandler.LOG_AUTH)
     else:
-        raise InputError(f"PALPEBRA_AUDIT_SYSLOG: there is no socket {listening.host}")
+        raise InputError(
+            f"PALPEBRA_AUDIT_SYSLOG: expected a socket, found none at {listening.host}; start syslog "
+            "or correct the setting"
+        )
     handler.setFormatter(logging.Formatter("palpebra-audit: %(message)s"))
     return handler
 

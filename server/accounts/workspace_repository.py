@@ -29,7 +29,7 @@ from server.models import (
 # run: links, status, settings, exclusions, the making of reports and capsules, the deletion of capsules.
 # edit: versions, deletion of drafts, erasure of persons.
 # export: downloads, the files of reports and capsules, and the answers of single persons.
-# own: recruiters' ids, grants, the workspace a study belongs to; an owner of a study may do all of it.
+# own: recruiters' IDs, grants, the workspace a study belongs to; an owner of a study may do all of it.
 
 OF_ROLE: Final[dict[Role, frozenset[Right]]] = {
     "viewer": frozenset({"view", "export"}),

@@ -225,7 +225,7 @@ def account_named(session: Session, name: str) -> Account:
     """The account of this name; NotFound where there is none (names are not guessed at)."""
     account = accounts.account_named(session, name)
     if account is None:
-        raise NotFound(f"There is no account '{name[:100]}'; Invite the person first.")
+        raise NotFound(f"There is no account '{name[:100]}'; invite the person first.")
     return account
 
 

@@ -171,7 +171,7 @@ class S3Store:
     client : Any
         Of boto3 for S3.
     presigned : bool, optional
-        Whether browsers fetch clips from the store by signed addresses.
+        Whether browsers fetch clips from the store by signed URLs.
     """
 
     def __init__(self, client: Any, bucket: str, prefix: str = "", *, presigned: bool = False) -> None:
@@ -244,14 +244,14 @@ class S3Store:
         return None
 
     def address(self, sha256: str) -> str | None:
-        """A signed address good for an hour, where browsers are to fetch clips from the store."""
+        """A signed URL good for an hour, where browsers are to fetch clips from the store."""
         if not self.presigned:
             return None
         what = {"Bucket": self.bucket, "Key": self._name(sha256)}
         return str(self.client.generate_presigned_url("get_object", Params=what, ExpiresIn=PRESIGNED_S))
 
     def origin(self) -> str | None:
-        """Scheme and host of the signed addresses, for the content security policy."""
+        """Scheme and host of the signed URLs, for the content security policy."""
         address = self.address("0" * 64)
         return f"{urlsplit(address).scheme}://{urlsplit(address).netloc}" if address else None
 

@@ -131,6 +131,9 @@ def export(
             )
             if form == "csv" and scripts and str(out_file) != "-":
                 beside = _write_scripts(out_file, version_of_series(session, known, extract.series))
+        except InputError:
+            # It says by itself what is wrong and what to do, such as a wide table of paired comparisons.
+            raise
         except (ValueError, SQLAlchemyError) as error:
             raise InputError(
                 f"the export failed ({str(error).splitlines()[0]}) and was discarded; run: server doctor"

@@ -213,7 +213,7 @@ def download_psych_ds(asked: Asked) -> StreamingResponse:
 
 @router.get("/identities.csv", response_class=StreamingResponse)
 def download_identities(services: ServicesDep, identity: Myself, study: str) -> StreamingResponse:
-    """Recruiters' ids with the pseudonyms, one row per visit; for owners of the study, and audited."""
+    """Recruiters' IDs with the pseudonyms, one row per visit; for owners of the study, and audited."""
     return Download(services, identity, study, EVERYTHING).stream("identities", CSV_TYPE, "identities.csv")
 
 

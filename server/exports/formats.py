@@ -70,7 +70,7 @@ def convert(folder: Path, ending: Ending) -> Path:
     return target
 
 
-# Recruiters' ids with the pseudonyms: a separate export, for owners.
+# Recruiters' IDs with the pseudonyms: a separate export, for owners.
 
 
 def identity_rows(session: Session, study: Study) -> Iterator[list[Any]]:
@@ -143,7 +143,7 @@ def psych_ds_zip(session: Session, study: Study, extract: Extract) -> Iterator[b
 
 
 def identities_csv(session: Session, study: Study, extract: Extract) -> Iterator[bytes]:
-    """One row per visit whose person is known, of any origin: the recruiter's id and the pseudonym."""
+    """One row per visit whose person is known, of any origin: the recruiter's ID and the pseudonym."""
     del extract
     rows = identity_rows(session, study)
     yield from csv_pieces(check_whole(rows, repository.known_person_count(session, study), extra=1))

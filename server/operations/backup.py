@@ -36,7 +36,7 @@ from server.privacy.rows import Content, Digest, read_rows, snapshot, tables_of
 #
 # The file is a tar: `backup.json` (what is in it), `tables/NAME.ndjson.gz` (the rows, of neither database's
 # own form, so that a backup of SQLite can be restored to PostgreSQL and back), `clips/SHA256.mp4`,
-# `secret_key`. The keys of recruiters' ids are in a separate file, see `server.operations.key_escrow`.
+# `secret_key`. The keys of recruiters' IDs are in a separate file, see `server.operations.key_escrow`.
 
 DESCRIPTION, TABLES, CLIPS, KEY = "backup.json", "tables/", "clips/", "secret_key"
 SPOOL_BYTES = 1 << 24

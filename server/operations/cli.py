@@ -248,7 +248,7 @@ def rewrap(
 ) -> None:
     """After a change of the secret key, re-encrypt what the old key protects.
 
-    Recruiters' ids, second factors and the chain of the audit log are converted to the key of the settings.
+    Recruiters' IDs, second factors and the chain of the audit log are converted to the key of the settings.
     Afterwards make a new backup and store the old key apart from your backups. Keep it: earlier backups can
     only be restored with it (server restore FILE --keys).
     Example: server database rewrap /media/safe/secret_key
@@ -270,8 +270,8 @@ def rewrap(
     if carried.broken is not None:
         raise InputError(
             "second factors and the audit log were left as they are, as the log fits neither key: "
-            f"{carried.broken}; recruiters' ids are carried over. Where the key was changed twice, set the "
-            "one between, carry over the first to it, then that one to the last"
+            f"{carried.broken}; recruiters' IDs are carried over. If the key was changed twice, carry "
+            "over to the key in between first, then to the current one"
         )
     out.print(
         "the chain of the audit log was rebuilt; save its new head (server audit verify), because older "

@@ -86,7 +86,7 @@ def backup(
     """Back up database, clips and secret key in one file while the server runs.
 
     The file contains all answers and the secret key: keep it where only you can read it (mode 600), or
-    encrypt it for another host with --to. The keys of recruiters' ids are in palpebra-keys.json, which each
+    encrypt it for another host with --to. The keys of recruiters' IDs are in palpebra-keys.json, which each
     backup replaces. Keep only the newest copy of it, so that erased people are erased from older backups too.
 
     The folders of FILE and of the key file must exist.

@@ -111,7 +111,7 @@ class RekeyedSecrets:
     Attributes
     ----------
     identities, unreadable : int
-        Recruiters' ids whose keys were wrapped again, and those that are not under the old key.
+        Recruiters' IDs whose keys were wrapped again, and those that are not under the old key.
     second_factors : int
         Of accounts.
     broken : str or None
@@ -125,10 +125,10 @@ class RekeyedSecrets:
 
 
 def carry_over(session: Session, old: bytes, secret: bytes) -> RekeyedSecrets:
-    """Wrap recruiters' ids and second factors under the key of now, and make the audit log's chain by it.
+    """Wrap recruiters' IDs and second factors under the key of now, and make the audit log's chain by it.
 
     A log that fits neither key is left as it is: it must not become whole by this. So are second factors
-    then, since only the log says under which key each was set up; recruiters' ids say it themselves.
+    then, since only the log says under which key each was set up; recruiters' IDs say it themselves.
 
     Raises
     ------

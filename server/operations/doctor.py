@@ -351,15 +351,15 @@ def counts(services: Services) -> Iterator[Finding]:
 
 
 def identities(services: Services) -> Iterator[Finding]:
-    """Recruiters' ids can be read with the installation's key."""
+    """Recruiters' IDs can be read with the installation's key."""
     with services.database.read() as session:
         counted = Counter(readable_identities(session))
     if counted[False]:
-        said = f"{counted[False]} of {counted.total()} recruiters' ids cannot be read"
+        said = f"{counted[False]} of {counted.total()} recruiters' IDs cannot be read"
         advice = "the secret key was changed; run: server database rewrap OLD_KEY_FILE"
-        yield Finding("recruiters' ids", "failed", said, advice)
+        yield Finding("recruiters' IDs", "failed", said, advice)
     else:
-        yield Finding("recruiters' ids", "ok", f"{counted.total()}, each encrypted with a separate key")
+        yield Finding("recruiters' IDs", "ok", f"{counted.total()}, each encrypted with a separate key")
 
 
 def clips(services: Services) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""What no backup holds: the keys of recruiters' ids and of pseudonyms, in one separate file."""
+"""What no backup holds: the keys of recruiters' IDs and of pseudonyms, in one separate file."""
 
 import hashlib
 import json
@@ -60,11 +60,11 @@ def set_run_keys(connection: Connection, keys: Mapping[str, str]) -> tuple[int, 
     return len(known), len(unknown)
 
 
-# What no backup holds: the keys of recruiters' ids and of pseudonyms, in one file that each backup replaces.
+# What no backup holds: the keys of recruiters' IDs and of pseudonyms, in one file that each backup replaces.
 #
 # Who is erased has no key in the next key file, so that what older backups hold of the id opens no more,
 # wherever they are. The keys are wrapped (AES key wrap) under the secret key, which backups hold: neither
-# file opens a recruiter's id without the other, and a guessed id cannot be tried against the pseudonyms of a
+# file opens a recruiter's ID without the other, and a guessed id cannot be tried against the pseudonyms of a
 # backup alone.
 
 NAME = "palpebra-keys.json"

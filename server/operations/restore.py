@@ -60,7 +60,7 @@ def restore(
     Parameters
     ----------
     keys : Path, optional
-        The key file, next to the backup if None; without one recruiters' ids are left out.
+        The key file, next to the backup if None; without one recruiters' IDs are left out.
     stale_keys : bool
         Take one that is older than the backup, though ids of later visits are left out then.
     despite_erasures : bool
@@ -221,7 +221,7 @@ def _put_keys_back(connection: Connection, keys: _Keys, told: Callable[[str], No
             f"participants with such an ID count as new. If you have the file, restore again with --keys FILE"
         )
     elif readable or lost:
-        told(f"{readable} recruiters' ids; the keys of {lost} no longer exist")
+        told(f"{readable} recruiters' IDs; the keys of {lost} no longer exist")
 
 
 def _write_table(connection: Connection, table: Table, tar: tarfile.TarFile) -> Content:
@@ -239,7 +239,10 @@ def _write_table(connection: Connection, table: Table, tar: tarfile.TarFile) -> 
 
 def _in_order(known: dict[str, Table], described: Description) -> list[str]:
     if unknown := sorted(set(described.tables) - set(known)):
-        raise InputError(f"the backup contains a table '{unknown[0]}' that its revision does not have")
+        raise InputError(
+            f"the backup contains a table '{unknown[0]}' that its revision does not have; it is damaged, use "
+            "another backup"
+        )
     return [name for name in known if name in described.tables]
 
 
@@ -252,7 +255,9 @@ def _rows(tar: tarfile.TarFile, name: str) -> Iterator[Row]:
 def _restore_clip(clips: ClipStore, tar: tarfile.TarFile, sha256: str) -> None:
     # The store checks the hash; only names of the form that we wrote are looked for.
     if not (len(sha256) == 64 and PurePosixPath(sha256).name == sha256):
-        raise InputError(f"the backup names a clip '{sha256[:80]}', which is not a hash")
+        raise InputError(
+            f"the backup names a clip '{sha256[:80]}', which is not a hash; it is damaged, use another backup"
+        )
     with _member(tar, f"{CLIPS}{sha256}.mp4") as source:
         clips.add(source, sha256)
 

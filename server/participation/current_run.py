@@ -59,8 +59,8 @@ class RunDataTooLarge(ApiError, status=413, code="run_data_too_large"):
 def checked_device(device: dict[str, Any]) -> dict[str, Any]:
     """`device` as it is to be stored; RunDataTooLarge where it is more than a browser has to say."""
     if len(device) > DEVICE_KEYS:
-        raise RunDataTooLarge(f"Expected at most {DEVICE_KEYS} facts of the device, got {len(device)}.")
-    _check_size(device, DEVICE_BYTES, "the facts of the device")
+        raise RunDataTooLarge(f"Expected at most {DEVICE_KEYS} device properties, got {len(device)}.")
+    _check_size(device, DEVICE_BYTES, "the device properties")
     return device
 
 
@@ -78,13 +78,15 @@ def check_event_types(types: Iterable[str]) -> None:
     """EventReserved where one of the types is the server's own."""
     reserved = sorted(SERVER_EVENTS.intersection(types))
     if reserved:
-        raise EventReserved(f"Events of type '{reserved[0]}' are the server's own; nothing is stored.")
+        raise EventReserved(f"Events of type '{reserved[0]}' are reserved for the server; nothing is stored.")
 
 
 def check_events(data: Sequence[dict[str, Any]], stored: int) -> None:
     """RunDataTooLarge where an event, or the number of a run's events, is too large."""
     if stored + len(data) > EVENTS_A_RUN:
-        raise RunDataTooLarge(f"This visit has {stored} events; {EVENTS_A_RUN} are the most.")
+        raise RunDataTooLarge(
+            f"Expected at most {EVENTS_A_RUN} events of a visit, got {stored + len(data)}; nothing is stored."
+        )
     for one in data:
         checked_data(one)
 
@@ -92,7 +94,9 @@ def check_events(data: Sequence[dict[str, Any]], stored: int) -> None:
 def check_calibrations(stored: int) -> None:
     """RunDataTooLarge where a run has as many calibrations as it may."""
     if stored >= CALIBRATIONS_A_RUN:
-        raise RunDataTooLarge(f"This visit has {stored} calibrations; no more are taken.")
+        raise RunDataTooLarge(
+            f"Expected at most {CALIBRATIONS_A_RUN} calibrations of a visit, got {stored + 1}."
+        )
 
 
 def _check_size(value: Mapping[str, Any], limit: int, what: str) -> None:

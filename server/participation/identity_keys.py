@@ -1,4 +1,4 @@
-"""Recruiters' ids under a key for each run, so that erasing the key erases the id wherever it was copied.
+"""Recruiters' IDs under a key for each run, so that erasing the key erases the id wherever it was copied.
 
 Each run draws a key k of 256 bits. What the recruiter's address said is kept as AES-256-GCM(k, JSON), with
 the run's public id as associated data. k itself is kept wrapped (AES key wrap, RFC 3394) under HKDF-SHA-256
@@ -66,13 +66,13 @@ class UnreadableError(InputError):
 
     def __init__(self, what: str) -> None:
         super().__init__(
-            f"the recruiter's id of {what} cannot be read with this installation's secret key; where the key "
+            f"the recruiter's ID of {what} cannot be read with this installation's secret key; where the key "
             "was changed run: server database rewrap OLD_KEY_FILE"
         )
 
 
 def identifier_hash(study_key: str, identifier: str) -> str:
-    """HMAC-SHA-256 of a recruiter's id under the study's key; empty for none."""
+    """HMAC-SHA-256 of a recruiter's ID under the study's key; empty for none."""
     if not identifier:
         return ""
     # Surrogates: an address may hold bytes that are not UTF-8, and they are part of the id.
@@ -80,7 +80,7 @@ def identifier_hash(study_key: str, identifier: str) -> str:
     return hmac.digest(bytes.fromhex(study_key), named, hashlib.sha256).hex()
 
 
-# Decision 0740: One key per recruiter id, and no key in a backup.
+# Decision 0740: One key per recruiter ID, and no key in a backup.
 def seal(secret: bytes, run: str, known_as: ParticipantIdentity) -> Sealed:
     """Encrypt under a new key; `secret` is the installation's key, `run` the run's public id."""
     # A new key for each run: a random nonce is then never used twice with it.

@@ -1,4 +1,4 @@
-"""Recruiters' ids, encrypted in one table and their keys in another."""
+"""Recruiters' IDs, encrypted in one table and their keys in another."""
 
 from collections.abc import Iterator
 
@@ -75,7 +75,7 @@ def _with_keys() -> Select[str, str, str]:
 
 
 def same_person(session: Session, run: StudyRun) -> ColumnElement[bool] | None:
-    """Which runs are under the recruiter's id of this one; None where the recruiter named nobody."""
+    """Which runs are under the recruiter's ID of this one; None where the recruiter named nobody."""
     query = select(RecruiterIdentity.identifier_hash).where(RecruiterIdentity.study_run_id == run.id)
     known = session.scalar(query)
     # An empty hash is of an address that named nobody, and matches nobody.

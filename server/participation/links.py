@@ -119,7 +119,7 @@ def start_run(
     link = find_link(session, token)
     # The study first, as in `complete_run`: two orders of locks would wait for each other.
     study = run_repository.lock_study(session, link.study_id)
-    # By client id, personal link or the recruiter's id: asking twice gives one run.
+    # By client id, personal link or the recruiter's ID: asking twice gives one run.
     known = returning.known_run(settings, versions, session, link, recruiter_of(link), start)
     if known is not None:
         experiment = versions.get(session, known.version_id).experiment

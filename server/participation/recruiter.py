@@ -1,4 +1,4 @@
-"""Where participants come from and go back to, and the signed addresses of recruiters."""
+"""Where participants come from and go back to, and the signed URLs of recruiters."""
 
 import hashlib
 import hmac
@@ -14,7 +14,7 @@ from server.participation.refusals import IdentifierInvalid, RecruiterNotSet, Si
 
 # Where participants come from and go back to: Prolific, SONA, MTurk, or any other address.
 #
-# A recruiter's id arrives in an address that anybody can write. It is checked against the form in which that
+# A recruiter's ID arrives in an address that anybody can write. It is checked against the form in which that
 # recruiter writes its ids, and ids that differ only in case or blanks are one person's.
 #
 # A study's (or link's) `recruiter` is an object with these keys, all but `kind` optional: kind: prolific,
@@ -196,7 +196,7 @@ def _filled_in(address: str, code: str, run: str, parameters: Mapping[str, str])
     return address or None
 
 
-# Signed addresses of recruiters: who shows one has it from the experimenters, and may go on with a visit.
+# Signed URLs of recruiters: who shows one has it from the experimenters, and may go on with a visit.
 #
 # secret = HMAC-SHA-256(k, "recruiter signature:" study key ":" name) with k the installation's key and the
 # study's own, so that it is not another study's; another name makes another secret, by which all addresses
@@ -211,7 +211,7 @@ def signing_secret(key: bytes, study_key: str, name: str) -> bytes:
     return hmac.digest(key, f"{PURPOSE}:{study_key}:{name}".encode("utf-8", "surrogatepass"), hashlib.sha256)
 
 
-# Decision 0701: Signed addresses open a visit.
+# Decision 0701: Signed URLs open a visit.
 def signature_of(secret: bytes, identifier: str) -> str:
     """The signature of a participant's id."""
     return hmac.digest(secret, identifier.encode("utf-8", "surrogatepass"), hashlib.sha256).hex()

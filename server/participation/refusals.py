@@ -113,7 +113,7 @@ class RunLeft(Conflict, code="run_left"):
 
 
 class ResumeCodeNeeded(Conflict, code="resume_code_needed"):
-    """A visit under this recruiter's id has begun in another browser; the id alone does not take it up."""
+    """A visit under this recruiter's ID has begun in another browser; the id alone does not take it up."""
 
 
 class ResumeCodeWrong(Conflict, code="resume_code_wrong"):
@@ -121,7 +121,7 @@ class ResumeCodeWrong(Conflict, code="resume_code_wrong"):
 
 
 class IdentifierInvalid(Invalid, code="identifier_invalid"):
-    """The recruiter's id in the address is not written as that recruiter writes its ids."""
+    """The recruiter's ID in the address is not written as that recruiter writes its ids."""
 
 
 class RecruiterNotSet(Conflict, code="recruiter_not_set"):
@@ -137,7 +137,7 @@ class SignatureWrong(Conflict, code="signature_wrong"):
 
 
 class TakenPartAlready(Conflict, code="taken_part_already"):
-    """A visit under this recruiter's id is over."""
+    """A visit under this recruiter's ID is over."""
 
 
 class RatingsMissing(Conflict, code="ratings_missing"):

@@ -35,7 +35,7 @@ from server.participation.versions import Versions
 #
 # A resume code is twelve signs in three groups. The first four identify the visit (20 bits of its public id),
 # the other eight (40 bits) are derived from the installation's key. What identifies a person is not what
-# lets one in: a recruiter's id is known to many, the code only to whom the page has shown it.
+# lets one in: a recruiter's ID is known to many, the code only to whom the page has shown it.
 
 CODE_PURPOSE = "resume"
 _SIGNS = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
@@ -96,7 +96,7 @@ def _signs(typed: str) -> str:
 # Who comes back to a visit, by what, and whether it may be taken up again.
 #
 # A visit is taken up by the secret its browser keeps (the client id), by a personal link, by the resume
-# code that the page has shown, or by an address that was signed with the study's secret. A recruiter's id
+# code that the page has shown, or by an address that was signed with the study's secret. A recruiter's ID
 # says whose visit it is and opens nothing: it is in addresses, lists and e-mails, and some recruiters
 # count it up.
 
@@ -162,7 +162,7 @@ def _run_of_id(
     recruiter: Recruiter,
     start: RunStart,
 ) -> StudyRun | None:
-    """The run of the recruiter's id where the address is signed that it began by; otherwise none."""
+    """The run of the recruiter's ID where the address is signed that it began by; otherwise none."""
     # A personal link is the person: an id in its address must not lead to somebody else's visit.
     if link.kind == "personal":
         return None
@@ -202,7 +202,7 @@ def _run_of_code(settings: Settings, session: Session, link: Link, typed: str) -
 
 
 def _refuse_by_id_alone(experiment: Experiment, run: StudyRun, start: RunStart) -> None:
-    """Refuse a person who has only the recruiter's id of `run`, unless another visit may begin."""
+    """Refuse a person who has only the recruiter's ID of `run`, unless another visit may begin."""
     if run.status != "active":
         raise TakenPartAlready(
             "The visit with this sign-up is complete. Its resume code shows the last page again."

@@ -94,7 +94,7 @@ class RunStart(BaseModel):
     )
     anew: bool = Field(
         default=False,
-        description="Begin a visit though one under the same recruiter's id is open in another browser.",
+        description="Begin a visit though one under the same recruiter's ID is open in another browser.",
     )
 
 

@@ -183,11 +183,11 @@ def calibrations(session: Session, run: StudyRun) -> list[Calibration]:
 def every_visit(session: Session, runs: Sequence[StudyRun], *, lock: bool = False) -> list[StudyRun]:
     """All visits to the study that are known to be the person's of these runs, not erased, these first.
 
-    Known are those by the same personal link and those under the same recruiter's id, and what is known by
+    Known are those by the same personal link and those under the same recruiter's ID, and what is known by
     these in turn. Previews are nobody's.
     """
     known, news = {run.id: run for run in runs}, list(runs)
-    # In turn: a run found by its link may have another recruiter's id, and so on.
+    # In turn: a run found by its link may have another recruiter's ID, and so on.
     while news:
         further = [other for run in news for other in _of_same_person(session, run, lock=lock)]
         news = list({other.id: other for other in further if other.id not in known}.values())

@@ -97,7 +97,7 @@ def erase_person(
 
 def _one_of_both(run: str, identifier: str) -> None:
     if bool(run) == bool(identifier):
-        raise InputError("expected either --run (the run's identifier) or --id (the recruiter's id)")
+        raise InputError("expected either --run (the run's identifier) or --id (the recruiter's ID)")
 
 
 # `server retention`: what the declared periods erase, and its erasure.

@@ -25,7 +25,7 @@ ABOUT = (
 
 
 def visits_of(session: Session, study: Study, run: str, identifier: str) -> list[StudyRun]:
-    """The visits of a person, identified by one of the runs or by the recruiter's id.
+    """The visits of a person, identified by one of the runs or by the recruiter's ID.
 
     Raises
     ------

@@ -42,7 +42,7 @@ OF_LINKS = frozenset({"public_id", "kind", "created_at", "label"})
 
 
 def runs_known_as(session: Session, study: Study, identifier: str) -> list[StudyRun]:
-    """The visits to a study under a recruiter's id, however written, erased ones left out.
+    """The visits to a study under a recruiter's ID, however written, erased ones left out.
 
     They are found by the keyed hash of the id.
     """

@@ -160,7 +160,7 @@ def replayed_trial(session: Session, study: Study, public_id: str, trial_index: 
     run = find_run(session, study, public_id)
     trial = replay_repository.assigned_trial(session, run, trial_index)
     if trial is None:
-        raise NotFound(f"The run '{run.public_id}' has no trial {trial_index}; its trials are 0 and up.")
+        raise NotFound(f"The run '{run.public_id}' has no trial {trial_index}; trials are numbered from 0.")
     assigned = replay_repository.clips_of_trial(session, run, trial_index)
     ratings = replay_repository.answers(session, run, trial_index)
     stored = replay_repository.views(session, run, trial_index)

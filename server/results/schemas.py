@@ -354,7 +354,7 @@ class RunIdentity(BaseModel):
 
     run: str
     participant: str = Field(description="The study's pseudonym.")
-    identifier: str = Field(description="The recruiter's id; empty where the address named nobody.")
+    identifier: str = Field(description="The recruiter's ID; empty where the address named nobody.")
     parameters: VisibleObject = Field(description="Of the address by which the participant came.")
     link: str = Field(description="Label of the link.")
 

@@ -165,7 +165,7 @@ def _frame_map_csv(shown: Iterable[int]) -> str:
 clip_router = APIRouter(tags=["clips"], responses=ERROR_RESPONSES)
 IMMUTABLE = "public, max-age=31536000, immutable"
 REDIRECT_KEPT_S = 1800
-"""Half of what a signed address of `server.core.storage` is good for."""
+"""Half of what a signed URL of `server.core.storage` is good for."""
 _RANGE = re.compile(r"^bytes=([0-9]{0,15})-([0-9]{0,15})$")
 _CLIP_ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"content": {"video/mp4": {"schema": {"type": "string", "format": "binary"}}}},
@@ -225,7 +225,7 @@ def _part(header: str, size: int) -> tuple[int, int] | None:
         start, end = int(match[1]), min(size, int(match[2]) + 1 if match[2] else size)
     if start >= end:
         raise RangeNotSatisfiable(
-            f"The clip has {size} bytes; the part asked for lies outside.",
+            f"Expected a range within the clip's {size} bytes, got one from byte {start}.",
             headers={"content-range": f"bytes */{size}"},
         )
     return start, end

@@ -300,7 +300,7 @@ def get_signing(
     secret_name: Label | None = None,
     link: Label | None = None,
 ) -> Signing:
-    """The secret for signed addresses, with examples; for owners alone, each look is in the audit log.
+    """The secret for signed URLs, with examples; for owners alone, each look is in the audit log.
 
     If a link has its own recruiter, give its id as `link`; otherwise the study's recruiter counts.
     """

@@ -489,7 +489,7 @@ class Comparison(BaseModel):
 
 
 class Signing(BaseModel):
-    """The study's secret for signed addresses, and how the recruiter's side signs with it."""
+    """The study's secret for signed URLs, and how the recruiter's side signs with it."""
 
     declared: bool = Field(description="The recruiter declares that addresses are signed.")
     parameter: str = Field(description="Address parameter of the signature.")

@@ -398,7 +398,7 @@ def check_room(folder: Path) -> None:
     kept += files_aside(folder)
     if len(kept) > MAX_FILES or sum(map(_size, kept)) > MAX_KEPT_BYTES:
         raise UploadTooLarge(
-            f"An upload holds at most {MAX_FILES} files and {MAX_KEPT_BYTES >> 30} GiB; Add the others to "
+            f"An upload holds at most {MAX_FILES} files and {MAX_KEPT_BYTES >> 30} GiB. Add the others to "
             f"the study as a new version."
         )
 

@@ -69,7 +69,9 @@ def _rated_scales(experiment: Experiment, part: Part) -> tuple[RatedScale, ...]:
 
 def _check(scale: RatedScale, given: ScaleAnswer) -> None:
     if given.not_applicable and not scale.not_applicable:
-        raise RatingOutOfScale(f"Expected a number on {scale.name}, got not_applicable, which it has not.")
+        raise RatingOutOfScale(
+            f"Expected a number on {scale.name}, got not_applicable, which this scale does not offer."
+        )
     if given.response is not None and not scale.admits(given.response):
         numbers = "a whole number" if scale.step == 1 else f"a number in steps of {scale.step:g}"
         raise RatingOutOfScale(

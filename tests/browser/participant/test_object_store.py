@@ -1,4 +1,4 @@
-"""Clips fetched by the browser itself from an object store (moto's server), by signed addresses.
+"""Clips fetched by the browser itself from an object store (moto's server), by signed URLs.
 
 moto lets every page in, whatever the bucket's CORS rule says; that a rule is needed, and which, is Amazon's
 documentation. The browser's own behavior is tested here: the redirect to another origin under our

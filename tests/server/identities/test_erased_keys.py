@@ -42,7 +42,7 @@ def people(client: TestClient, link: str) -> list[Participant]:
 
 
 def ids(services: Services) -> dict[str, str]:
-    """Run -> the recruiter's id, of those that can be read."""
+    """Run -> the recruiter's ID, of those that can be read."""
     with services.database.read() as session:
         known = {run.public_id: known_as(session, run) for run in session.scalars(select(StudyRun))}
     return {run: person.identifier for run, person in known.items() if person}
@@ -73,7 +73,7 @@ def test_an_erased_person_is_gone_from_older_backups_too(
     back_up(services.database, services.settings, services.clips, tmp_path / "newer.tar", with_clips=False)
     again, lines = restored(older, empty_database_url, tmp_path / "new")
     assert ids(again) == {other: CODES[1]}
-    assert "1 recruiters' ids; the keys of 1 no longer exist" in lines
+    assert "1 recruiters' IDs; the keys of 1 no longer exist" in lines
     with again.database.read() as session:
         assert list(readable_identities(session)) == [True]
     again.database.close()
@@ -142,7 +142,7 @@ def test_with_the_key_file_ids_and_pseudonyms_are_as_before(
     done = run_server_command(
         settings, "restore", "--despite-erasures", str(tmp_path / "a" / "b.tar"), "--keys", str(keys)
     )
-    assert "2 recruiters' ids; the keys of 0 no longer exist" in done.stdout, done.stderr
+    assert "2 recruiters' IDs; the keys of 0 no longer exist" in done.stdout, done.stderr
     again = open_services(settings)
     assert sorted(ids(again).values()) == list(CODES)
     with again.database.read() as one, services.database.read() as other:

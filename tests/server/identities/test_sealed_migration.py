@@ -1,4 +1,4 @@
-"""The migration that encrypts recruiters' ids: nothing stays in the open, and back goes all or nothing."""
+"""The migration that encrypts recruiters' IDs: nothing stays in the open, and back goes all or nothing."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ BEFORE, SEALED = "0024", "0025"
 
 @pytest.fixture
 def golden(tmp_path: Path) -> Services:
-    """A database with recruiters' ids."""
+    """A database with recruiters' IDs."""
     url = f"sqlite:///{tmp_path / 'x.sqlite'}"
     services = open_services(Settings(database_url=url, data_folder=tmp_path / "data"))
     restore(
@@ -65,7 +65,7 @@ def test_an_id_that_does_not_open_is_not_dropped(golden: Services) -> None:
         kept = connection.execute(text("SELECT wrapped_key FROM identity_keys LIMIT 1")).scalar_one()
         wrong = text("UPDATE identity_keys SET wrapped_key = :wrong WHERE wrapped_key = :kept")
         connection.execute(wrong, {"wrong": "A" * 56, "kept": kept})
-    with pytest.raises(CommandError, match="1 recruiters' ids do not open with this secret key"):
+    with pytest.raises(CommandError, match="1 recruiters' IDs do not open with this secret key"):
         downgrade(golden.database, BEFORE)
     assert current_revision(golden.database) == newest_revision()
     with golden.database.write_connection() as connection:

@@ -1,4 +1,4 @@
-"""A recruiter's id opens by its own key, its run and the installation's secret key, and by nothing else."""
+"""A recruiter's ID opens by its own key, its run and the installation's secret key, and by nothing else."""
 
 import base64
 import json

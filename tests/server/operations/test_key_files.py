@@ -117,7 +117,7 @@ def test_a_key_file_older_than_the_backup_fails_drill_and_restore(
     assert len(refused.stderr.strip().splitlines()) == 1, "nothing was written before"
     assert "--stale-keys" in refused.stderr
     done = run_server_command(target.settings, *arguments, "--stale-keys")
-    assert "1 recruiters' ids; the keys of 1 no longer exist" in done.stdout, done.stderr
+    assert "1 recruiters' IDs; the keys of 1 no longer exist" in done.stdout, done.stderr
 
 
 @pytest.mark.parametrize("kind", ["here", "off the host"])
@@ -268,7 +268,7 @@ def test_a_restore_takes_no_keys_of_another_installation(
         "--keys",
         str(tmp_path / "a" / NAME),
     )
-    assert "1 recruiters' ids; the keys of 0 no longer exist" in again.stdout, again.stderr
+    assert "1 recruiters' IDs; the keys of 0 no longer exist" in again.stdout, again.stderr
 
 
 def test_after_a_change_of_the_secret_key_older_backups_keep_their_keys(
@@ -329,7 +329,7 @@ def test_two_installations_share_a_store_without_the_private_key(
     done = run_server_command(
         target.settings, "restore", "--despite-erasures", str(folder / backup), "--identity", str(safe[1])
     )
-    assert "1 recruiters' ids; the keys of 0 no longer exist" in done.stdout, done.stderr
+    assert "1 recruiters' IDs; the keys of 0 no longer exist" in done.stdout, done.stderr
     target.database.close()
 
 

@@ -81,7 +81,7 @@ def keys(tmp_path: Path) -> tuple[str, Path]:
 
 @pytest.fixture
 def rated(client: TestClient, services: Services, study: StudyInDatabase) -> Services:
-    """Somebody with a recruiter's id has rated."""
+    """Somebody with a recruiter's ID has rated."""
     person = Participant(client, study.link(recruiter={"kind": "sona"}))
     person.start(query={"survey_code": CODE})
     person.request("PUT", "/consent", {"agreed": True})
@@ -115,7 +115,7 @@ def test_a_bucket_gets_it_encrypted_and_it_comes_back(
     assert "is encrypted; specify the file of its private key" in refused.stderr
     done = run_server_command(new, "restore", address, "--identity", str(private), "--despite-erasures")
     assert done.returncode == 0, done.stderr
-    assert "1 recruiters' ids; the keys of 0 no longer exist" in done.stdout
+    assert "1 recruiters' IDs; the keys of 0 no longer exist" in done.stdout
     again = open_services(new)
     with again.database.read() as one, rated.database.read() as other:
         count = "SELECT count(*) FROM trial_ratings"
@@ -137,7 +137,7 @@ def test_who_is_erased_since_is_erased_again_from_an_older_one(
     address = str(tmp_path / "elsewhere" / older.name)
     done = run_server_command(new, "restore", address, "--identity", str(keys[1]), "--despite-erasures")
     assert "1 run erased again" in done.stdout, done.stderr
-    assert "0 recruiters' ids; the keys of 1 no longer exist" in done.stdout
+    assert "0 recruiters' IDs; the keys of 1 no longer exist" in done.stdout
 
 
 def test_a_drill_of_a_bucket(

@@ -1,4 +1,4 @@
-"""Recruiters' ids: a pseudonym everywhere, in one table, and no key to anybody's visit."""
+"""Recruiters' IDs: a pseudonym everywhere, in one table, and no key to anybody's visit."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""Signed addresses of recruiters: they take up a visit, and nothing else that names somebody does."""
+"""Signed URLs of recruiters: they take up a visit, and nothing else that names somebody does."""
 
 import hashlib
 import hmac
@@ -42,7 +42,7 @@ def secret_of(services: Services, study: str = "short", name: str = "") -> bytes
 
 @pytest.fixture
 def signed(services: Services, link: str) -> dict[str, str]:
-    """The parameters of a signed address, made as the recruiter's side makes them."""
+    """The parameters of a signed URL, made as the recruiter's side makes them."""
     code = hmac.new(secret_of(services), PERSON.encode(), hashlib.sha256).hexdigest()
     return {"participant": PERSON, "sig": code}
 

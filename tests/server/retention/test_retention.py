@@ -40,7 +40,7 @@ def kept(services: Services, tmp_path: Path) -> StudyInDatabase:
 
 
 def came(client: TestClient, study: StudyInDatabase, days_ago: float, *, completed: bool = True) -> str:
-    """Somebody with a recruiter's id whose last sign of life was so long ago; the run."""
+    """Somebody with a recruiter's ID whose last sign of life was so long ago; the run."""
     person = Participant(client, study.link(recruiter={"kind": "sona"}))
     person.start(query={"survey_code": f"4{days_ago:g}"})
     person.request("PUT", "/consent", {"agreed": True})

@@ -110,7 +110,11 @@ def test_each_scale_is_a_row_and_what_does_not_apply_is_not_a_number(
         ({**GIVEN, "natural": {"response": 6}}, "rating_out_of_scale", "whole number from 1 to 5 on natural"),
         ({**GIVEN, "eerie": {"response": 100.5}}, "rating_out_of_scale", "from 0 to 100 on eerie, got 100.5"),
         ({**GIVEN, "eerie": {"response": 62.2}}, "rating_out_of_scale", "a number in steps of 0.5"),
-        ({**GIVEN, "natural": NEITHER}, "rating_out_of_scale", "got not_applicable, which it has not"),
+        (
+            {**GIVEN, "natural": NEITHER},
+            "rating_out_of_scale",
+            "got not_applicable, which this scale does not offer",
+        ),
         ({**GIVEN, "natural": {"response": "4"}}, "invalid", "natural"),
         ({**GIVEN, "eerie": {"response": 4, "not_applicable": True}}, "invalid", "got both"),
         ({}, "invalid", "answers"),

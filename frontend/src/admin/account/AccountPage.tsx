@@ -303,7 +303,7 @@ function SessionsCard() {
           <DataTable
             rows={rows}
             rowKey={(row) => row.id}
-            empty="Nowhere."
+            empty="You are signed in nowhere else."
             columns={[
               { title: "Browser", cell: (row) => <span title={row.user_agent}>{browserName(row.user_agent)}</span> },
               { title: "Last seen", wide: true, cell: (row) => when(row.last_seen_at) },
@@ -374,7 +374,7 @@ function TokensCard() {
             <DataTable
               rows={rows}
               rowKey={(row) => row.id}
-              empty="No tokens."
+              empty="No tokens yet."
               columns={[
                 { title: "Name", cell: (row) => row.name },
                 { title: "May", cell: (row) => row.scopes.join(", ") },

@@ -249,7 +249,7 @@ const FILES: [file: string, title: string, words: string][] = [
 const IDENTITIES: (typeof FILES)[number] = [
   "identities.csv",
   "Identities",
-  "Recruiter ids with their pseudonyms, for payment. Stored separately; each download is in the audit log.",
+  "Recruiter IDs with their pseudonyms, for payment. Stored separately; each download is in the audit log.",
 ];
 
 type ExportOrigin = DataOrigin | "all";

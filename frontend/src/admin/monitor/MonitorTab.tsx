@@ -1,8 +1,22 @@
-import { Card, Group, Progress, Stack, Text, Title, SegmentedControl, Alert, Center, Loader, SimpleGrid } from "@mantine/core";
+import {
+  Anchor,
+  Card,
+  Code,
+  Group,
+  Progress,
+  Stack,
+  Text,
+  Title,
+  SegmentedControl,
+  Alert,
+  Center,
+  Loader,
+  SimpleGrid,
+} from "@mantine/core";
 import { type Schemas, sessionQuery, studyQuery } from "../api";
 import { words, ago, ORIGINS, soon } from "../ui/format";
 import { useEffect, useRef, memo, type MouseEvent, useState, startTransition } from "react";
-import { useNavigate, useParams } from "@tanstack/react-router";
+import { Link, useNavigate, useParams } from "@tanstack/react-router";
 import { useQueryClient } from "@tanstack/react-query";
 import { Figures } from "../studies/Design";
 import { onDemand } from "../ui/Answer";
@@ -330,6 +344,36 @@ function othersIn(others: Record<string, number>): string {
   return named.length === 0 ? "" : `Other origins: ${named.join(", ")}`;
 }
 
+const NO_ONE: Record<string, string> = {
+  participant: "No one has started this study yet.",
+  pilot: "No one has started the pilot yet.",
+  simulated: "There are no simulated participants yet.",
+  preview: "No one has previewed this study yet.",
+};
+
+/** Nothing to follow yet: why, and what to do. */
+function NoOne({ study, origin }: { study: string; origin: string }) {
+  const links = (
+    <Anchor component={Link} to={`/studies/${study}/links`}>
+      link
+    </Anchor>
+  );
+  return (
+    <Text c="dimmed">
+      {NO_ONE[origin]}{" "}
+      {origin === "simulated" ? (
+        <>
+          Add some with <Code>server simulate {study}</Code>.
+        </>
+      ) : origin === "preview" ? (
+        "Press Preview as a participant to see it as they do."
+      ) : (
+        <>Share a {links}: people who open it appear here within two seconds.</>
+      )}
+    </Text>
+  );
+}
+
 export function MonitorTab() {
   const { study = "" } = useParams({ strict: false });
   const [chosen, setOrigin] = useState<Origin | null>(null);
@@ -368,7 +412,7 @@ export function MonitorTab() {
         ]}
       />
       {snapshot.runs.length === 0 ? (
-        <Text c="dimmed">No runs of origin {snapshot.origin} yet. Anyone who opens a link appears here within two seconds.</Text>
+        <NoOne study={study} origin={snapshot.origin} />
       ) : (
         <>
           <SimpleGrid cols={{ base: 1, md: 2 }}>

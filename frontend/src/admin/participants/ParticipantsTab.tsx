@@ -68,7 +68,15 @@ export function ParticipantsTab() {
         </Group>
       )}
       <PagedAnswer of={runs} shown={rows.length} total={total} more="Earlier participants">
-        <RunsTable study={study} rows={rows} empty={chosen ? "No matches." : "No one has started yet."} />
+        <RunsTable
+          study={study}
+          rows={rows}
+          empty={
+            chosen
+              ? "No participant matches. Change the text or the choice above."
+              : "No one has started yet. Share a link from the tab Links."
+          }
+        />
       </PagedAnswer>
     </Stack>
   );

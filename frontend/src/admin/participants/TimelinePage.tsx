@@ -42,7 +42,7 @@ function Identity({ study, run }: IdentityProps) {
     <Answer of={identity}>
       {(data) => (
         <Stack gap="xs">
-          <Text>Recruiter’s id: {data.identifier || "none"}</Text>
+          <Text>Recruiter’s ID: {data.identifier || "none"}</Text>
           <Text>Link: {data.link || "without a label"}</Text>
           {Object.entries(data.parameters).map(([name, value]) => (
             <Text size="sm" key={name} className="wrap-anywhere">

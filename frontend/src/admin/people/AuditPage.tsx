@@ -28,7 +28,7 @@ export function AuditPage() {
         <DataTable
           rows={rows}
           rowKey={(row) => row.id}
-          empty="Nothing yet."
+          empty="No change has been recorded yet."
           paged={false}
           columns={[
             { title: "When", wrap: true, cell: (row) => when(row.at) },

@@ -144,7 +144,7 @@ export function PeoplePage() {
           <DataTable
             rows={rows}
             rowKey={(row) => row.id}
-            empty="Nobody."
+            empty="No accounts yet."
             columns={[
               { title: "Name", cell: (row) => row.name },
               {

@@ -123,7 +123,7 @@ export function WorkspacesPage() {
         <Title order={1}>Workspaces</Title>
         <Text size="sm" c="dimmed">
           A study belongs to a workspace and is visible to its members only. Viewers see and download, experimenters create and run studies,
-          owners see recruiter ids and manage members. To share a single study, use its settings.
+          owners see recruiter IDs and manage members. To share a single study, use its settings.
         </Text>
       </div>
       <Answer of={useQuery(workspacesQuery)}>

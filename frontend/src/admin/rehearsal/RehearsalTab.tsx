@@ -194,7 +194,13 @@ export function RehearsalTab() {
         )}
       </Card>
       <Answer of={latest}>
-        {(data) => (data === null ? <Text c="dimmed">Not rehearsed yet.</Text> : <Latest study={study} rehearsal={data} />)}
+        {(data) =>
+          data === null ? (
+            <Text c="dimmed">Not rehearsed yet. Choose a number of people and press Rehearse.</Text>
+          ) : (
+            <Latest study={study} rehearsal={data} />
+          )
+        }
       </Answer>
     </Stack>
   );

@@ -145,8 +145,7 @@ function NoAnswers({ origin, runs, every, series, choose, chooseSeries }: NoAnsw
   return (
     <Group>
       <Text c="dimmed">
-        No answers from {OF[origin]} in this data series yet
-        {others.length > 0 && `, only from ${listed}`}.
+        No answers from {OF[origin]} yet{others.length > 0 && `, only from ${listed}`}. Charts appear here with the first answer.
       </Text>
       {others.map(({ value, label }) => (
         <Button key={value} variant="default" size="xs" onClick={() => choose(value)}>
@@ -193,7 +192,7 @@ function Reports({ study, origin, series }: { study: string; origin: DataOrigin;
       <Answer of={reports}>
         {(rows) =>
           rows.length === 0 ? (
-            <Text c="dimmed">None yet. A report contains the tables, figures and the analysis of this study.</Text>
+            <Text c="dimmed">None yet. Build one for the tables, figures and analysis of this study.</Text>
           ) : (
             <Stack gap="xs">
               {rows.map((row) => (

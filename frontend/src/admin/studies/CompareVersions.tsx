@@ -138,7 +138,7 @@ export function Versions({ detail }: { detail: Schemas["StudyDetail"] }) {
       <DataTable
         rows={detail.versions}
         rowKey={(version) => version.number}
-        empty="None."
+        empty="No versions yet."
         columns={[
           {
             title: "Version",

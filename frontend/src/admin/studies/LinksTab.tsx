@@ -58,7 +58,7 @@ function LinkTable({ study, rows, recruiter, owns }: TableProps) {
     <DataTable
       rows={rows}
       rowKey={(row) => row.id}
-      empty="No links yet."
+      empty="No links yet. Create one above."
       paged={false}
       columns={[
         {

@@ -14,7 +14,7 @@ import { Link, useParams, useSearch } from "@tanstack/react-router";
 type Preview = Schemas["RetentionPreview"];
 
 const WHAT: Record<Preview["periods"][number]["what"], string> = {
-  identifiers: "Identifiers (recruiter ids, URL parameters, completion codes, labels of personal links)",
+  identifiers: "Identifiers (recruiter IDs, URL parameters, completion codes, labels of personal links)",
   unfinished: "Incomplete visits with their answers",
   answers: "All visits with their answers",
 };

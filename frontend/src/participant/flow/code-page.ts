@@ -45,7 +45,7 @@ export function codePage(root: HTMLElement, t: Translate, why: MessageKey, ident
       claim({ resume_code: input.value });
     };
     const go = h("button", { type: "submit", class: "button primary" }, t("continue"));
-    // Somebody who entered a code has begun nothing under a recruiter's id.
+    // Somebody who entered a code has begun nothing under a recruiter's ID.
     const startOver = why === "code_needed" ? button(t("code_anew"), () => claim({ anew: true }), "quiet") : null;
     const back = why === "code_enter" ? button(t("code_back"), () => location.reload(), "quiet") : null;
     const form = h(
