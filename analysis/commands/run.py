@@ -20,6 +20,8 @@ from experiments.errors import InputError
 from experiments.files import check_folder
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from analysis.read.pool import Pool
     from experiments.declaration.experiment import Experiment
     from experiments.load import UnknownExperimentError
@@ -155,13 +157,13 @@ def run(
                 # SQLAlchemy takes as long to import as numpy, and a CSV needs none of it
                 from analysis.read.database import load_database
 
-                url, said = database or stored_at(), None
+                url = database or stored_at()
+                said: tuple[str, ...] = ()
                 if is_shipped(experiment):
                     declared, said = _definition_in_use(declared, study, pool, url)
                 reading = plan_of(declared.trial.kind).reading
                 answers = load_database(url, declared, reading, study, report and sensitivity)
-                if said is not None:
-                    answers = replace(answers, decisions=(said, *answers.decisions))
+                answers = replace(answers, decisions=(*said, *answers.decisions))
             contents = study_contents(declared, answers, pool, read_runs(runs) if runs else None, scale)
     except NoRatingsError as error:
         typer.echo(f"nothing to analyze: {error}", err=True)
@@ -186,13 +188,13 @@ def stored_at() -> str:
 
 def _definition_in_use(
     shipped: "Experiment", study: str | None, pool: "Pool", url: str
-) -> tuple["Experiment", str | None]:
-    """The definition of the newest version that this pool's answers were given to, and a decision about it.
+) -> tuple["Experiment", tuple[str, ...]]:
+    """The definition of the newest version that this pool's answers were given to, and decisions about it.
 
-    It may be of another kind of trial than the shipped one. Without a decision it is the shipped one.
+    It may be of another kind of trial than the shipped one.
     """
     from analysis.plans.plan import plan_of
-    from analysis.read.database import answered_versions, database_name, stored_definition
+    from analysis.read.database import answered_versions, database_name
     from analysis.read.pool import DECLARATION, VERSION, pooled
     from experiments.load import parse_experiment
     from experiments.schema.canonical import definition_sha256
@@ -200,28 +202,56 @@ def _definition_in_use(
     own, reading = definition_sha256(shipped), plan_of(shipped.trial.kind).reading
     answered = answered_versions(url, shipped, reading, study)
     if answered["study"].nunique() > 1:
-        answered = answered[answered["trial_kind"] == shipped.trial.kind]
+        of_kind = answered[answered["trial_kind"] == shipped.trial.kind]
+        answered = answered[answered["study"].isin(of_kind["study"])]
     # Of several studies of this kind none is chosen here: `load_database` says which there are.
     if answered["study"].nunique() != 1:
-        return shipped, None
+        return shipped, ()
     # The same choice as among the answers themselves, whose columns these are.
     rows = pooled(answered, pool, database_name(url), own).rows
     newest = rows[rows[VERSION] == rows[VERSION].max()]
-    if newest.empty or set(newest[DECLARATION]) <= {own, ""}:
-        return shipped, None
+    if newest.empty:
+        return shipped, ()
+    # Answers of this kind in other series are counted where rows are pooled; the others are not among these.
+    ignored = () if pool.series or pool.version else _said_of_other_kinds(answered, newest)
+    if set(newest[DECLARATION]) <= {own, ""}:
+        return shipped, ignored
     name, number = str(newest["study"].iloc[0]), int(newest[VERSION].iloc[0])
-    toml = stored_definition(url, name, None, number)
-    if not toml:
-        raise InputError(
-            f"study '{name}' (version {number}) differs from the shipped {shipped.name}, and its definition "
-            "is not in the database; give its TOML file instead"
-        )
+    toml = _definition_text(url, name, number, shipped.name)
     said = (
         f"study '{name}' was edited: its own definition (version {number}) is used, not the shipped "
         f"{shipped.name}"
     )
     typer.echo(f"{said[:1].upper()}{said[1:]}.", err=True)
-    return parse_experiment(toml, name, has_data=True), said
+    return parse_experiment(toml, name, has_data=True), (said, *ignored)
+
+
+def _said_of_other_kinds(answered: "pd.DataFrame", newest: "pd.DataFrame") -> tuple[str, ...]:
+    from analysis.read.pool import SERIES
+
+    same_origin = answered["run_origin"].isin(newest["run_origin"])
+    others = answered[same_origin & ~answered["trial_kind"].isin(newest["trial_kind"])]
+    return tuple(
+        f"answers of another kind of trial in data series {number} were ignored; to analyze them: --series "
+        f"{number}"
+        for number in sorted(set(others[SERIES]))
+    )
+
+
+def _definition_text(url: str, study: str, version: int, shipped: str) -> str:
+    from analysis.read.database import stored_definition
+
+    try:
+        if toml := stored_definition(url, study, None, version):
+            return toml
+        why = "is not in the database"
+    except InputError:
+        # As where a user may read the answers alone.
+        why = "cannot be read there"
+    raise InputError(
+        f"study '{study}' (version {version}) differs from the shipped {shipped}, and its definition {why}; "
+        "give its TOML file instead"
+    )
 
 
 def _declared_experiment(

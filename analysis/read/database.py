@@ -94,7 +94,7 @@ class AnswersQuery:
                     f"{self.name} has no view '{self._view}'; start the server once to create it"
                 )
         except DBAPIError as error:
-            raise InputError(f"cannot read {self.name}: {_first_line(error)}") from error
+            raise InputError(f"cannot read {self.name}: {_first_line(error.orig)}") from error
         return connection
 
     def close(self) -> None:
@@ -185,6 +185,11 @@ class AnswersQuery:
             cursor.execute(str(sql))
             while portion := cursor.fetchmany(PORTION):
                 yield portion
+        except self._engine.dialect.loaded_dbapi.Error as error:
+            raise InputError(
+                f"cannot read {self.name}: {_first_line(error)}; if it is of an older version, `server "
+                "database upgrade` or a start of the server upgrades it"
+            ) from error
         finally:
             cursor.close()
 
@@ -276,7 +281,7 @@ def _selected(url: str, selection: str, study: str) -> list[tuple[Any, ...]]:
     except DBAPIError as error:
         raise InputError(
             f"'{study}' is not a shipped experiment, and studies cannot be looked up: cannot read {name}: "
-            f"{_first_line(error)}"
+            f"{_first_line(error.orig)}"
         ) from error
     finally:
         engine.dispose()
@@ -342,5 +347,5 @@ def database_name(url: str) -> str:
     return f"database {parsed.database} on {parsed.host}"
 
 
-def _first_line(error: DBAPIError) -> str:
-    return str(error.orig).strip().splitlines()[0]
+def _first_line(error: BaseException | None) -> str:
+    return str(error).strip().splitlines()[0]

@@ -16,6 +16,7 @@ from experiments.load import load_experiment, locate, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from tests.analysis.ratings_file import rows_of, simulate, write_export
 from tests.analysis.study_database import make_database
+from tests.helpers.golden_databases import golden_file
 
 EXP3 = load_experiment("exp3")
 LONG = "id,y,face,blur\n" + "".join(
@@ -154,6 +155,15 @@ def test_a_database_whose_studies_cannot_be_read_is_named_with_the_cause(tmp_pat
     with pytest.raises(InputError, match=words) as raised:
         call_raising("run", "motion", "--database", f"sqlite:///{file}")
     assert "\n" not in str(raised.value)
+
+
+def test_a_database_of_an_older_version_is_named_with_what_to_do(tmp_path) -> None:
+    """That of 0.1.0 has the view of ratings with fewer columns."""
+    file = tmp_path / "older.sqlite"
+    file.write_bytes(golden_file("0001.sqlite"))
+    words = r"cannot read older\.sqlite: no such column: \w+; if it is of an older version, `server database"
+    with pytest.raises(InputError, match=words):
+        call_raising("run", "exp1", "--database", f"sqlite:///{file}")
 
 
 def call_raising(*arguments: str) -> None:

@@ -82,6 +82,20 @@ def test_a_study_whose_kind_of_trial_was_changed_is_analysed_as_the_kind_of_its_
         run(database_url, "--no-report", "--series", 3)
 
 
+def test_answers_of_another_kind_are_named_where_the_shipped_definition_has_answers(
+    services: Services, database_url: str, tmp_path: Path
+) -> None:
+    save_and_answer(services, PAIRS, tmp_path / "one")
+    save_and_answer(services, RATINGS, tmp_path / "two")
+    found = run(database_url, "--no-report")
+    assert "Abilities" in found.stdout
+    said = "answers of another kind of trial in data series 2 were ignored; to analyze them: --series 2"
+    assert said in " ".join(found.stdout.split())
+    rated = " ".join(run(database_url, "--no-report", "--series", 2).stdout.split())
+    assert "Mean ratings by condition" in rated
+    assert "another kind of trial" not in rated
+
+
 def test_ratings_alone_are_found_though_the_shipped_study_compares_pairs(
     services: Services, database_url: str, tmp_path: Path
 ) -> None:
@@ -141,6 +155,9 @@ def test_a_user_who_may_read_the_view_alone_analyses_a_study_as_shipped(
         found = run(url.render_as_string(hide_password=False), "--no-report")
         assert found.exit_code == 0, found.output
         assert found.stdout == run(database_url, "--no-report").stdout
+        save_and_answer(services, REWORDED, tmp_path / "two")
+        with pytest.raises(InputError, match=r"its definition cannot be read there; give its TOML file"):
+            run(url.render_as_string(hide_password=False), "--no-report", "--series", 2)
     finally:
         restored = "ALTER VIEW comparisons SET (security_invoker = true)"
         order(restored, f"REVOKE ALL ON comparisons FROM {role}", f"DROP ROLE {role}")
