@@ -8,6 +8,10 @@ module run in both versions, until the first failure, and the test that failed r
 Results are appended to `tools/house/mutation.jsonl` as they come, so a run that was stopped continues, also
 at a later commit: its expressions stay in the sample. Without `--minutes` it runs to the end. The last lines
 are the killed shares of both versions.
+
+An expression runs with at most six test files, and moved code has other ones among its first six. So where
+one version notices a change and the other does not, `--settle` runs the other again with every file that
+imports the module, and marks the row as `settled`.
 """
 
 from __future__ import annotations
@@ -31,7 +35,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("server", "analysis", "experiments", "stimuli_builder", "blink_engine", "video_conversion")
 RESULTS = ROOT / "tools" / "house" / "mutation.jsonl"
-SECONDS = 300
+SECONDS, SETTLE_SECONDS = 300, 1800
 """Most processor seconds for the tests of one expression: a change that makes them loop counts as noticed.
 
 Not seconds of the clock, or a busy machine would count as a loop. A run that only waits ends after four times
@@ -120,7 +124,7 @@ def changed_source(site: Site) -> str:
     return ast.unparse(tree)
 
 
-def tests_of(site: Site, tree: Path) -> list[str]:
+def tests_of(site: Site, tree: Path, most: int | None) -> list[str]:
     """The test files that import a module, those that name its function first; else those near it."""
     file = site.file
     module = ".".join(file.relative_to(tree).with_suffix("").parts)
@@ -130,14 +134,14 @@ def tests_of(site: Site, tree: Path) -> list[str]:
     direct = [path for path in tests if imports.search(path.read_text(encoding="utf-8"))]
     near = [path for path in tests if path.parent.name == file.parent.name]
     named = sorted(direct or near, key=lambda path: site.function not in path.read_text(encoding="utf-8"))
-    return [str(path.relative_to(tree)) for path in named[:MAX_FILES]]
+    return [str(path.relative_to(tree)) for path in named[:most]]
 
 
 class Trials:
     """Runs tests in one version, each time in a fresh copy of a process that has the libraries loaded."""
 
-    def __init__(self, tree: Path) -> None:
-        """Compile the version, and start the process that is copied."""
+    def __init__(self, tree: Path, seconds: int) -> None:
+        """Compile the version, and start the process that is copied, which gives each run so many seconds."""
         self.tree = tree
         self.short = ["-m", "not long"] if (tree / "tests" / "tiers.toml").is_file() else []
         for package in (*PACKAGES, "tests"):
@@ -145,7 +149,7 @@ class Trials:
         # A module changed twice in a second would be taken from the compiled file of the first change.
         environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1", "OPENBLAS_NUM_THREADS": "1"}
         self.process = subprocess.Popen(
-            [sys.executable, "-c", PROCESS, str(SECONDS)],
+            [sys.executable, "-c", PROCESS, str(seconds)],
             cwd=tree,
             env=environment,
             text=True,
@@ -214,9 +218,9 @@ for line in sys.stdin:
 """
 
 
-def outcome(site: Site, trials: Trials) -> str:
+def outcome(site: Site, trials: Trials, most: int | None = MAX_FILES) -> str:
     """`killed`, `survived`, or `untested` where no test imports the module or all that fail do so anyway."""
-    tests = tests_of(site, trials.tree)
+    tests = tests_of(site, trials.tree, most)
     original = site.file.read_text(encoding="utf-8")
     broken: list[str] = []
     while tests:
@@ -235,6 +239,23 @@ def outcome(site: Site, trials: Trials) -> str:
     return "untested"
 
 
+def settle(
+    rows: dict[str, dict[str, object]], sides: dict[str, tuple[dict[str, Site], Trials]], results: Path
+) -> None:
+    """Run every test of the side that did not notice a change which the other noticed."""
+    for key, row in rows.items():
+        missed = [side for side in sides if row[side] != "killed"]
+        if len(missed) != 1 or "settled" in row:
+            continue
+        sites, trials = sides[missed[0]]
+        if key not in sites:  # a later commit has changed the line
+            continue
+        row[missed[0]] = outcome(sites[key], trials, None)
+        row["settled"] = True
+        results.write_text("".join(json.dumps(one) + "\n" for one in rows.values()), encoding="utf-8")
+        print(f"{row['before']:9} {row['after']:9} {key[:90]}", flush=True)
+
+
 def main() -> int:
     """Run the sample, or go on with it."""
     parser = argparse.ArgumentParser(
@@ -246,6 +267,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--minutes", type=float, default=float("inf"))
     parser.add_argument("--results", type=Path, default=RESULTS)
+    parser.add_argument("--settle", action="store_true", help="run more tests where the versions differ")
     given = parser.parse_args()
     # Else a stop by a signal would leave a changed expression in the tree.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
@@ -258,7 +280,11 @@ def main() -> int:
     more = random.Random(50).sample(left, max(0, given.count - len(known)))
     chosen = [*known, *more][: given.count]
     until = time.monotonic() + given.minutes * 60
-    old, new = Trials(given.tree.resolve()), Trials(given.here.resolve())
+    seconds = SETTLE_SECONDS if given.settle else SECONDS
+    old, new = Trials(given.tree.resolve(), seconds), Trials(given.here.resolve(), seconds)
+    if given.settle:
+        settle(known, {"before": (before, old), "after": (after, new)}, given.results)
+        chosen = list(known)
     for key in chosen:
         if key in known or time.monotonic() > until:
             continue
