@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 import type { FromWorker, ToWorker } from "../../src/participant/playback/protocol";
-import { WorkerPlayer } from "../../src/participant/playback/worker-player";
+import { choosePlayer, WorkerPlayer } from "../../src/participant/playback/worker-player";
 
 const CLIP = "a".repeat(64);
 const LIMIT_MS = 20_000;
@@ -112,6 +112,32 @@ describe("what the page waits for from its worker", () => {
     const { drawn, ended_at_ms } = await shown;
     expect(drawn[0]?.[1]).toBeCloseTo(drawn_ms, 0);
     expect(ended_at_ms - drawn_ms).toBeCloseTo(33, 0);
+  });
+
+  it("ends a worker that has started and then never answers, and shows clips by the video element", async () => {
+    let ended = 0;
+    vi.stubGlobal(
+      "Worker",
+      class extends SilentWorker {
+        constructor() {
+          super();
+          setTimeout(() => this.onmessage?.({ data: { type: "started" } as unknown as FromWorker }), 1);
+        }
+        terminate(): void {
+          ended += 1;
+        }
+      },
+    );
+    const transferControlToOffscreen = (): object => ({});
+    vi.stubGlobal("HTMLCanvasElement", { prototype: { transferControlToOffscreen } });
+    vi.stubGlobal("VideoDecoder", {});
+    vi.stubGlobal("OffscreenCanvas", {});
+    vi.stubGlobal("document", { createElement: () => ({ transferControlToOffscreen, style: {}, append: () => {} }) });
+    vi.spyOn(console, "warn").mockImplementation(() => {});
+    const chosen = choosePlayer({ background: "#777777", sync_patch: false });
+    await vi.advanceTimersByTimeAsync(LIMIT_MS);
+    expect((await chosen).method).toBe("video");
+    expect(ended).toBe(1);
   });
 
   it("says that a worker which never answers did not", async () => {

@@ -212,6 +212,7 @@ export async function choosePlayer({ background, sync_patch }: Display): Promise
     }
   } catch (error) {
     // A canvas that cannot be handed over, as where an extension guards canvases, or a worker that stopped.
+    worker?.terminate();
     console.warn("clips are played by the video element", error);
   }
   const { VideoPlayer } = await loadModule(() => import("./video-player"));
