@@ -12,7 +12,7 @@ from scipy import special
 from analysis.within.adjustments import holm
 from analysis.within.anova import AnovaResult, linear_anova
 from analysis.within.between import reduced_columns, term_directions
-from analysis.within.contrasts import contrast_scores
+from analysis.within.strata import contrast_scores
 from experiments.errors import InputError
 
 # Permutation tests of every effect of an ANOVA: Freedman and Lane's, with sign flips within participants.

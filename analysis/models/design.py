@@ -21,8 +21,8 @@ from analysis.models.columns import (
 from analysis.models.formula import formula_name
 from analysis.models.reml import Term, intercept_term
 from analysis.read.number_columns import holds_numbers
-from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
 from analysis.within.level_codes import level_codes
+from analysis.within.strata import effect_members, effect_name, orthonormal_basis
 from experiments.errors import InputError
 
 # Cells of a factorial design as sum-coded effects, and as orthonormal contrasts of unit variance.

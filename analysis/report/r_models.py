@@ -17,7 +17,7 @@ from analysis.pairs.findings import Findings
 from analysis.plans.result import Analysis
 from analysis.report.r_script import SCRIPT, as_csv, head_of_script, r_number
 from analysis.report.write import fill_template
-from analysis.within.contrasts import effect_members
+from analysis.within.strata import effect_members
 from experiments.errors import InputError
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from analysis.within.contrasts import effect_members, effect_name, orthonormal_basis
+from analysis.within.strata import effect_members, effect_name, orthonormal_basis
 from experiments.declaration.experiment import Experiment
 from experiments.declaration.trial import RatedScale
 from experiments.design import rated_levels

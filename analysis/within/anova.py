@@ -10,9 +10,16 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
 from analysis.within.between import BetweenDesign, no_groups, term_directions
-from analysis.within.contrasts import contrast_scores, effect_name
 from analysis.within.multivariate_tests import MultivariateTest, MultivariateTests
-from analysis.within.strata import Hypothesis, Mauchly, SizeIntervals, above_noise, error_stratum
+from analysis.within.strata import (
+    Hypothesis,
+    Mauchly,
+    SizeIntervals,
+    above_noise,
+    contrast_scores,
+    effect_name,
+    error_stratum,
+)
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]

@@ -9,7 +9,7 @@ from itertools import accumulate, combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.within.contrasts import orthonormal_basis
+from analysis.within.strata import orthonormal_basis
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]

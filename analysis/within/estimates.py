@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import special
 
 from analysis.within.anova import AnovaResult
-from analysis.within.contrasts import effect_name
+from analysis.within.strata import effect_name
 from experiments.errors import InputError, did_you_mean
 
 Floats = NDArray[np.float64]

@@ -12,8 +12,8 @@ from scipy import special
 
 from analysis.within.adjustments import bonferroni, false_discovery_rate, holm, sidak, tukey
 from analysis.within.anova import AnovaResult
-from analysis.within.contrasts import effect_name
 from analysis.within.estimates import Margin, margin_of
+from analysis.within.strata import effect_name
 
 # Bayes factors of t tests with Jeffreys, Zellner and Siow's prior.
 

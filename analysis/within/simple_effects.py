@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from analysis.within.adjustments import holm
 from analysis.within.anova import AnovaResult, Effect, effects_of
-from analysis.within.contrasts import orthonormal_basis
 from analysis.within.multivariate_tests import MultivariateTest
-from analysis.within.strata import Hypothesis, above_noise, error_stratum
+from analysis.within.strata import Hypothesis, above_noise, error_stratum, orthonormal_basis
 from experiments.errors import InputError
 
 Floats = NDArray[np.float64]
