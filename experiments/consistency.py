@@ -1,6 +1,6 @@
 """Checks whether the parts of a declared experiment fit together. Every declaration is checked after reading.
 
-`experiments.load` and `experiments.schema.stored` call it.
+`experiments.load` calls it for TOML and for stored declarations.
 """
 
 from pydantic import ValidationError

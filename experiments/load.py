@@ -1,8 +1,11 @@
-"""Read an experiment from TOML: shipped by name, or a file. Problems include their line and a solution."""
+"""Read an experiment from TOML (shipped by name, or a file) or from the JSON data of a database.
+
+Problems in TOML include their line and a solution.
+"""
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -270,6 +273,30 @@ def parse_experiment(text: str, source: str = "definition", *, has_data: bool = 
         check_consistency(experiment, has_data=has_data)
     except ValueError as error:
         raise DefinitionError(source, [_unfit_part(str(error), text)]) from error
+    return experiment
+
+
+def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
+    """The declaration stored as JSON data of format `number`; InputError where it cannot be read."""
+    data = upgrade_data(definition, number)
+    try:
+        experiment = Experiment.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        path = ".".join(str(part) for part in first["loc"])
+        name = definition.get("name", "without a name")
+        raise InputError(
+            f"the stored definition {name} (format {number}) cannot be read: {path}: {wrong_value(first)}; "
+            "use the version of this program that stored it, and report this"
+        ) from error
+    try:
+        check_consistency(experiment, has_data=True)
+    except ValueError as error:
+        name = definition.get("name", "without a name")
+        raise InputError(
+            f"the stored definition {name} (format {number}) cannot be read: {error}; "
+            "use the version of this program that stored it, and report this"
+        ) from error
     return experiment
 
 

@@ -14,9 +14,9 @@ from pydantic import ValidationError
 from experiments.declaration.base import Declaration
 from experiments.declaration.experiment import Experiment
 from experiments.errors import InputError
+from experiments.load import load_stored
 from experiments.manifest import Sha256
 from experiments.schema.difference import difference
-from experiments.schema.stored import load_stored
 
 OF_PAGES = ("texts", "title", "participant_title", "languages", "source", "dataset", "version")
 """Keys whose change is not a deviation from a plan: page texts and metadata of the data."""

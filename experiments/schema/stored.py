@@ -1,15 +1,11 @@
-"""Read a declaration that a database holds, in whatever format it was stored."""
+"""Upgrade the data of a declaration from the format it was stored in to the newest one."""
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
 from typing import Any
 
-from pydantic import ValidationError
-
-from experiments.consistency import check_consistency
-from experiments.declaration.experiment import Experiment
-from experiments.errors import InputError, wrong_value
+from experiments.errors import InputError
 
 # From the format a declaration was stored in to the one this program reads.
 #
@@ -77,27 +73,3 @@ def _rename(data: Any, path: Sequence[str], name: str) -> None:
         _rename(data.get(path[0]), path[1:], name)
     elif isinstance(data, dict) and path[0] in data:
         data.setdefault(name, data.pop(path[0]))
-
-
-def load_stored(definition: Mapping[str, Any], number: int = 1) -> Experiment:
-    """The declaration stored as JSON data of format `number`; InputError where it cannot be read."""
-    data = upgrade_data(definition, number)
-    try:
-        experiment = Experiment.model_validate(data)
-    except ValidationError as error:
-        first = error.errors()[0]
-        path = ".".join(str(part) for part in first["loc"])
-        name = definition.get("name", "without a name")
-        raise InputError(
-            f"the stored definition {name} (format {number}) cannot be read: {path}: {wrong_value(first)}; "
-            "use the version of this program that stored it, and report this"
-        ) from error
-    try:
-        check_consistency(experiment, has_data=True)
-    except ValueError as error:
-        name = definition.get("name", "without a name")
-        raise InputError(
-            f"the stored definition {name} (format {number}) cannot be read: {error}; "
-            "use the version of this program that stored it, and report this"
-        ) from error
-    return experiment

@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from experiments.checks import CHECK_CELL, CheckName
 from experiments.declaration.experiment import Experiment
-from experiments.schema.stored import load_stored
+from experiments.load import load_stored
 from server.core.repository import clips_of_version, version_by_id
 from server.participation.tallies import NumberedClip, numbers
 

@@ -4,7 +4,7 @@ from sqlalchemy.orm import Session
 
 from experiments.declaration.experiment import Experiment
 from experiments.errors import did_you_mean
-from experiments.schema.stored import load_stored
+from experiments.load import load_stored
 from server.accounts import workspace_repository as workspaces
 from server.accounts.identity import Identity, NotAllowed, Operator, SecondFactorNeeded
 from server.accounts.workspace_repository import ordered_rights

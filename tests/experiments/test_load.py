@@ -11,12 +11,13 @@ from experiments.load import (
     SHIPPED,
     DefinitionError,
     load_experiment,
+    load_stored,
     locate,
     parse_experiment,
 )
 from experiments.rules import ScreenFormAnswer
 from experiments.schema.canonical import definition_sha256
-from experiments.schema.stored import FORMAT, load_stored
+from experiments.schema.stored import FORMAT
 from experiments.wording import unlisted
 from tests.helpers.studies import SHORT
 

@@ -22,7 +22,7 @@ ADDRESSES = {
         "experiments.schema.editor:editor_schema",
     ),
     "load_experiment": ("experiments.load:load_experiment",),
-    "load_stored": ("experiments.schema.stored:load_stored",),
+    "load_stored": ("experiments.load:load_stored", "experiments.schema.stored:load_stored"),
     "planned_clips": ("stimuli_builder.clips.design_clips:planned_clips",),
     "ClipOptions": ("stimuli_builder.clips.design_clips:Options",),
     "reserved_names": ("experiments.kinds:reserved_names", "experiments.trials:reserved_names"),

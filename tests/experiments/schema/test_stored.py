@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from experiments.declaration.base import IMPLIED, Declaration
 from experiments.errors import InputError
-from experiments.load import DefinitionError, load_experiment, locate, parse_experiment
+from experiments.load import DefinitionError, load_experiment, load_stored, locate, parse_experiment
 from experiments.schema.canonical import canonical, definition_sha256
 from experiments.schema.effects import keys
-from experiments.schema.stored import FORMAT, Step, earlier_names, load_stored, upgrade_data
+from experiments.schema.stored import FORMAT, Step, earlier_names, upgrade_data
 from tests.conftest import REPOSITORY
 
 FORMATS = sorted((REPOSITORY / "tests" / "golden" / "definitions").glob("format_*"))

@@ -16,11 +16,11 @@ from experiments.declaration.any_trial import TRIALS
 from experiments.declaration.experiment import Experiment
 from experiments.kinds import KINDS, block_sizes, reserved_names, trials_per_participant, views
 from experiments.kinds.kind import Kind
-from experiments.load import DefinitionError, locate, parse_experiment
+from experiments.load import DefinitionError, load_stored, locate, parse_experiment
 from experiments.schema.canonical import definition_sha256
 from experiments.schema.difference import difference
 from experiments.schema.effects import effect_of, effects_with, paths
-from experiments.schema.stored import FORMAT, load_stored
+from experiments.schema.stored import FORMAT
 from tests.conftest import REPOSITORY
 from tests.experiments.trials.toy import TOY
 

@@ -32,7 +32,8 @@ from analysis.plans.plan import plan_of, study_contents  # noqa: E402
 from analysis.read.database import load_database  # noqa: E402
 from analysis.read.study_answers import load_csv  # noqa: E402
 from analysis.report.write import write_report  # noqa: E402
-from experiments.schema.stored import FORMAT, load_stored  # noqa: E402
+from experiments.load import load_stored  # noqa: E402
+from experiments.schema.stored import FORMAT  # noqa: E402
 from server.accounts.identity import OPERATOR  # noqa: E402
 from server.app import create_app  # noqa: E402
 from server.context import open_services  # noqa: E402
