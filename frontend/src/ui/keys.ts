@@ -1,5 +1,4 @@
-/** Keys and presses: which one was meant, and what it stands for on a scale. */
-import type { Points } from "../api/schema";
+/** Keys and presses: what a key means on every layout, and whether a press was meant for what is on the screen. */
 
 // Digits as people write them: of every script, full-width ones, with marks of direction between.
 
@@ -48,9 +47,9 @@ export function listenKeys(handler: (event: KeyboardEvent) => void, signal: Abor
 }
 
 type Key = Pick<KeyboardEvent, "key" | "code" | "shiftKey">;
-/** What a key is called while an input method has it, or where a browser does not know it. */
 const ONE = /^.$/u;
 const OTHER_LETTER = /^\p{L}$/u;
+/** What a key is called while an input method has it, or where a browser does not know it. */
 const UNNAMED = ["Process", "Unidentified", "Dead", ""];
 
 /**
@@ -122,24 +121,4 @@ export class MeantPress {
 /** Which way scales run on this page: as it is read, unless the study keeps them as in languages read from left to right. */
 export function scaleDirection(): string {
   return document.documentElement.dataset["scales"] === "same" ? "ltr" : document.dir;
-}
-
-// Which keys mean what on the scale.
-
-type Range = Pick<Points, "minimum" | "maximum">;
-
-/** The value a key stands for, or null. 0 means ten on a scale that ends there and does not begin at zero. */
-export function valueOf(key: string, { minimum, maximum }: Range): number | null {
-  const digit = digitValue(key);
-  if (digit === null) return null;
-  if (digit >= minimum && digit <= maximum) return digit;
-  return digit === 0 && minimum > 0 && maximum === 10 ? 10 : null;
-}
-
-/** Step along the scale for an arrow key, in the direction of reading. */
-export function keyFor(key: string, right_to_left: boolean): -1 | 0 | 1 {
-  const forward = right_to_left ? "ArrowLeft" : "ArrowRight";
-  const backward = right_to_left ? "ArrowRight" : "ArrowLeft";
-  if (key === forward || key === "ArrowUp") return 1;
-  return key === backward || key === "ArrowDown" ? -1 : 0;
 }

@@ -7,7 +7,7 @@ import { owed, Replays, done, type Session } from "../../src/participant/session
 import { refreshRate, untilMeasured } from "../../src/participant/screen/window";
 import { clipHeight, clipWidth, screenChange, zoomed, isPlausible, type ScreenShape } from "../../src/participant/screen/size";
 import { deviation, randomStart, settled, spreadPercent, distanceFrom } from "../../src/participant/calibration/distance";
-import { keyFor, valueOf } from "../../src/ui/keys";
+import { keyFor, valueOf } from "../../src/participant/trials/scales/points";
 import { clipSize } from "../../src/participant/trials/showing";
 
 describe("actual size", () => {
