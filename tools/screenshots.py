@@ -38,11 +38,11 @@ from stimuli_builder.blinks.blink_model import default_model, textbook_profile
 from stimuli_builder.blinks.profile import resample, to_full_closure
 from stimuli_builder.characters.colour import linear_to_srgb
 from stimuli_builder.clips.characters import find_character, geometry, shipped_names
-from stimuli_builder.clips.curves import ClipCurve, Timing, clip_curve, frame_weights, frame_windows
+from stimuli_builder.clips.curves import ClipCurve, Timing, clip_curve
 from stimuli_builder.clips.design_clips import performance_curve
 from stimuli_builder.clips.exemplars import exemplar
 from stimuli_builder.clips.face_movement import moved_levels
-from stimuli_builder.clips.frames import FramePainter
+from stimuli_builder.clips.frames import FramePainter, frame_weights, frame_windows
 from stimuli_builder.clips.geometry import Movement
 from stimuli_builder.clips.kernels import FULL_SCALE
 from stimuli_builder.clips.levels import LevelSet

@@ -24,9 +24,9 @@ from experiments.manifest import (
 )
 from stimuli_builder.clips.build import Progress, silent
 from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
-from stimuli_builder.clips.curves import ClipCurve, frame_windows
+from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.face_movement import kept_levels
-from stimuli_builder.clips.frames import SEAM_MM, eye_light, regions_of, same_picture
+from stimuli_builder.clips.frames import SEAM_MM, eye_light, frame_windows, regions_of, same_picture
 from stimuli_builder.clips.geometry import Movement
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet

@@ -15,11 +15,11 @@ from stimuli_builder.clips.curves import (
     Timing,
     amplitude_of,
     clip_curve,
-    frame_weights,
     with_overshoot,
     within_reach,
 )
 from stimuli_builder.clips.design_clips import Options, planned_clips
+from stimuli_builder.clips.frames import frame_weights
 
 BLINK = textbook_profile("AL", 9, start_level=0.05, end_level=0.1)
 

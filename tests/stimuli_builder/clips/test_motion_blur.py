@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from experiments.errors import InputError
-from stimuli_builder.clips.curves import frame_weights
+from stimuli_builder.clips.frames import frame_weights
 
 
 def test_blur_at_30_fps_is_the_mean_of_ten_samples() -> None:
