@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -79,16 +80,20 @@ class AnswersQuery:
         self._values = {"experiment": experiment, **({"study": study} if study else {})}
         self._where = "experiment = :experiment" + (" AND study = :study" if study else "")
         self._engine = create_engine(with_driver(url))
-        self._connection = self._open()
+        # If a step fails, what the steps before it have opened is closed.
+        with ExitStack() as opened:
+            opened.callback(self._engine.dispose)
+            self._connection = self._open(opened)
+            self._opened = opened.pop_all()
 
-    def _open(self) -> Connection:
+    def _open(self, opened: ExitStack) -> Connection:
         if file := missing_file(self._engine.url):
             raise NoRatingsError(
                 f"there is no database at {file}; set PALPEBRA_DATA_FOLDER to the server's data folder, or "
                 "use --database or --csv"
             )
         try:
-            connection = self._engine.connect()
+            connection = opened.enter_context(self._engine.connect())
             if self._view not in inspect(connection).get_view_names():
                 raise NoRatingsError(
                     f"{self.name} has no view '{self._view}'; start the server once to create it"
@@ -98,9 +103,8 @@ class AnswersQuery:
         return connection
 
     def close(self) -> None:
-        """Let go of the database."""
-        self._connection.close()
-        self._engine.dispose()
+        """Close the connection to the database."""
+        self._opened.close()
 
     def rows(self, further: Sequence[str], factors: Sequence[str]) -> pd.DataFrame:
         """Main and attention rows: text as categories, numbers float, a column per factor, a run's columns.
