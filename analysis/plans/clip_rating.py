@@ -297,7 +297,7 @@ MULTIVERSE = "Multiverse of exclusions"
 
 
 def multiverse_section(analysis: Analysis, prepared: PlanRows, analyse: Analyse) -> Section:
-    """The section of the report: how far the tests hang on the rules."""
+    """The section of the report: how far the tests depend on the rules."""
     if not prepared.experiment.exclusions:
         return Section(MULTIVERSE, "The experiment declares no exclusion rule, so there is nothing to vary.")
     from analysis.plans.sensitivity import MAX_RATINGS

@@ -213,7 +213,7 @@ def simulate_design(
         raise InputError(f"expected at least 10 simulations, got {simulations}")
     power = np.empty((len(design.effects), len(sizes)))
     for column, n in enumerate(sizes):
-        rng = np.random.default_rng([seed, n])  # a size's numbers do not hang on the other sizes
+        rng = np.random.default_rng([seed, n])  # a size's numbers do not depend on the other sizes
         p = np.empty((simulations, len(design.effects)))
         for row in range(simulations):
             p[row] = design.p_values(n, rng)

@@ -28,7 +28,7 @@ class Origin(StrEnum):
 
 @dataclass(frozen=True)
 class Pool:
-    """What is wanted of a study's rows; None leaves the choice to the rows themselves.
+    """The rows of a study to analyze; None: chosen from the rows.
 
     A `version` is the answers given under it alone, a `series` those of all versions that measure the same.
     """
@@ -55,10 +55,10 @@ class PooledRows(NamedTuple):
 def pooled(rows: pd.DataFrame, pool: Pool, source: str, declaration_sha256: str) -> PooledRows:
     """The rows of this pool, and in words which they are and what was left aside.
 
-    Without a wish the origin is the first of participant, pilot and simulated that there is (in the version
-    or series asked for), and the series the latest that has answers given under the declaration with this
-    hash, else the latest; rows of others are left aside and counted. Sources without these columns (exports
-    of older programs) have the origin in `phase` and `synthetic`, and have one series.
+    If no origin is given, it is the first of participant, pilot and simulated that occurs in the rows (of the
+    version or series asked for). If no series is given, it is the latest with answers under the declaration
+    with this hash, else the latest of all. Other rows are ignored and counted. Sources without these columns
+    (exports of older programs) have the origin in `phase` and `synthetic`, and have one series.
 
     Raises
     ------

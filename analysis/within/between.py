@@ -227,7 +227,7 @@ def _refuse_deficient(design: BetweenDesign) -> None:
     # Far from dependent: the slow check of each term is not needed.
     if design.well_conditioned:
         return
-    # the last first: of what is determined together a covariate or its slopes are what was added
+    # Start with the last term: of dependent terms, name the covariate or slope, which was added last.
     for term, own in reversed(list(zip(design.terms, design.columns, strict=True))):
         others = np.delete(design.matrix, own, axis=1)
         if term and others.shape[1] and len(outside(design.matrix[:, own], others)) < len(own):
@@ -284,7 +284,10 @@ def _orthonormal(rows: Floats) -> Floats:
 
 
 def reduced_columns(design: BetweenDesign, term: tuple[str, ...], sum_of_squares: int) -> list[int]:
-    """Columns of the model without a term that it is tested against; of type II without what contains it."""
+    """Columns of the reduced model that a term is tested against.
+
+    Type II also leaves out terms that contain it.
+    """
     return [
         column
         for other, columns in zip(design.terms, design.columns, strict=True)

@@ -208,7 +208,7 @@ def _resolve_batch(loop: asyncio.AbstractEventLoop, batch: list[_Work]) -> None:
 Row = TypeVar("Row", bound=tuple[Any, ...])
 _Change = Callable[[Any], Any]
 _ResultProcessors = tuple[tuple[int, _Change], ...]
-"""Columns by their numbers, and what makes a value of that which the driver gives."""
+"""Columns by number, each with the converter from the driver's value."""
 
 
 class _Parameter(NamedTuple):
@@ -219,7 +219,7 @@ class _Parameter(NamedTuple):
     name : str
         Its name.
     change : callable or None
-        Makes the driver's value of ours; None where it is the same.
+        Converts our value to the driver's; None if they are the same.
     """
 
     name: str

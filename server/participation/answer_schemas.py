@@ -533,7 +533,7 @@ class TrialInfo(BaseModel):
 
 
 class WarningShown(BaseModel):
-    """A kind word to who answers without care; the page shows it before the next trial."""
+    """A friendly warning to a participant who answers carelessly; the page shows it before the next trial."""
 
     rule: str = Field(description="The rule of [[warnings.rules]] that the latest answers break.")
     number: int = Field(description="Which warning of this run it is, from 1.")

@@ -77,7 +77,7 @@ RunToken = Annotated[str, Depends(_run_token)]
 
 
 def _count(database: Database, limit: RateLimit, token: str) -> None:
-    """Count one event of a link that exists: strangers' inventions would take the room of true counts."""
+    """Count one event of a link that exists; made-up tokens would fill the rate limiter."""
     with database.read() as session:
         # Only for its refusal of an unknown link.
         links.find_link(session, token)

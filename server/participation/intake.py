@@ -31,12 +31,12 @@ from server.participation.refusals import (
 )
 from server.participation.tallies import ClipTime
 
-# Tickets: leave to answer one play of one trial, signed by the server when it hands the run out.
+# A ticket is permission to answer one play of one trial, signed by the server when it sends the run.
 #
 # A batch names its run and the moment it was issued, under a seal:  batch = run.t.nonce.seal,
 # seal = HMAC(k, "batch:" run.t.nonce), with t in milliseconds since 1970 and k the installation's key.
-# The ticket of trial i, play p is  HMAC(k, "ticket:" batch ":" i ":" p). Nothing of it is stored when it is
-# issued, and it is good offline. Both codes are cut to 128 bits.
+# The ticket of trial i, play p is  HMAC(k, "ticket:" batch ":" i ":" p). Nothing is stored when a ticket is
+# issued, and it is valid offline. Both codes are cut to 128 bits.
 
 # Half of SHA-256 is far out of reach of FALSE_ANSWERS_PER_MINUTE guesses, and every state carries a ticket
 # per play: 22 letters in place of 43.
@@ -141,8 +141,8 @@ TRIED_MS = 1_000.0
 """What a play without a rating takes at least: the page says that a clip cannot be shown for as long."""
 UNFETCHED, UNFETCHED_SHARE = 3, 5
 """Plays of a run without a rating and without the clip's digest: at most three, or one for five trials."""
-# Four times the outbox's longest pause (15 s): a delivery that is later waited for a connection, not for
-# its turn.
+# Four times the outbox's longest pause (15 s): an answer delivered later than this was waiting for a
+# connection, not for its turn.
 LATE = timedelta(seconds=60)
 _MILLISECOND = timedelta(milliseconds=1)
 # More than a faulty page sends by itself, whose pauses grow, and too few to try out tickets or digests.
@@ -229,12 +229,13 @@ class Intake:
     def take(
         self, connection: Connection, answer: Answer, before: ClipTime, *, stores: bool = True
     ) -> ClipTime:
-        """Store the evidence of an answer; refused by name where it cannot have been given so.
+        """Check and store the evidence of an answer; refuse an answer that cannot have been given like this.
 
-        Of what the run's answers took of its time before, makes what they took with this one. Without
-        `stores` it is checked alone: of an answer that is kept as refused.
+        Returns `before` with this answer's clip time added. With `stores=False` the answer is only checked,
+        because it is kept as a refused record.
 
-        Where nothing is refused, evidence that does not hold is left out: the answer then counts as without.
+        If the rules are not enforced for this run's origin, evidence that fails is dropped: the answer counts
+        as one without evidence, and adds no clip time.
         """
         enforced = self.enforces(answer.origin)
         try:

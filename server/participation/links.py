@@ -117,7 +117,7 @@ def start_run(
 ) -> RunStarted:
     """Begin a run, or give back the one this browser, person or personal link already has."""
     link = find_link(session, token)
-    # The study first, as in `complete_run`: two orders of locks would wait for each other.
+    # Lock the study first, as `complete_run` does: locking in different orders could deadlock.
     study = run_repository.lock_study(session, link.study_id)
     # By client id, personal link or the recruiter's ID: asking twice gives one run.
     known = returning.known_run(settings, versions, session, link, recruiter_of(link), start)

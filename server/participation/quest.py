@@ -95,7 +95,7 @@ def tilt(model: Model, counts: Mapping[Point, tuple[int, int]]) -> Tilt:
         axis = list(engine.param_domain).index("tilt")
         others = tuple(other for other in range(posterior.ndim) if other != axis)
         shares, values = posterior.sum(axis=others).tolist(), engine.param_domain["tilt"].tolist()
-    # Summed exactly: the estimate must not hang on how an array is split for its sum.
+    # Summed exactly: the estimate must not depend on how an array is split for its sum.
     mean = math.fsum(p * value for p, value in zip(shares, values, strict=True))
     variance = math.fsum(p * (value - mean) ** 2 for p, value in zip(shares, values, strict=True))
     return Tilt(-mean if model.falling else mean, math.sqrt(variance))

@@ -1,4 +1,4 @@
-"""Who comes back to a visit, by what code or address, and whether it may be taken up again."""
+"""How a returning visitor is recognized, by code or address, and whether the visit may be continued."""
 
 import hashlib
 import hmac
@@ -34,8 +34,8 @@ from server.participation.versions import Versions
 # without the key.
 #
 # A resume code is twelve signs in three groups. The first four identify the visit (20 bits of its public id),
-# the other eight (40 bits) are derived from the installation's key. What identifies a person is not what
-# lets one in: a recruiter's ID is known to many, the code only to whom the page has shown it.
+# the other eight (40 bits) are derived from the installation's key. A recruiter's ID identifies a person but
+# does not let them in, because many people know it. Only the person who saw the page knows the code.
 
 CODE_PURPOSE = "resume"
 _SIGNS = "0123456789ABCDEFGHJKMNPQRSTVWXYZ"
@@ -93,12 +93,12 @@ def _signs(typed: str) -> str:
     return "".join(typed.upper().replace("-", " ").split()).translate(_READ_AS)
 
 
-# Who comes back to a visit, by what, and whether it may be taken up again.
+# How a returning visitor is recognized, and whether the visit may be continued.
 #
-# A visit is taken up by the secret its browser keeps (the client id), by a personal link, by the resume
+# A visit is continued by the secret its browser keeps (the client id), by a personal link, by the resume
 # code that the page has shown, or by an address that was signed with the study's secret. A recruiter's ID
-# says whose visit it is and opens nothing: it is in addresses, lists and e-mails, and some recruiters
-# count it up.
+# identifies the visit but opens nothing: it is in addresses, lists and e-mails, and some recruiters number
+# their IDs consecutively.
 
 
 def name_of(link: Link, study: Study, identifier: str) -> str | None:
@@ -162,7 +162,7 @@ def _run_of_id(
     recruiter: Recruiter,
     start: RunStart,
 ) -> StudyRun | None:
-    """The run of the recruiter's ID where the address is signed that it began by; otherwise none."""
+    """The run that began with this recruiter ID by this signed address; otherwise None."""
     # A personal link is the person: an id in its address must not lead to somebody else's visit.
     if link.kind == "personal":
         return None
@@ -175,7 +175,7 @@ def _run_of_id(
     other = run_repository.latest_run(session, link, name) if name else None
     if other is None:
         return None
-    # Who began without a signature may be anybody who knew the id.
+    # A visit that began without a signature may belong to anybody who knew the id.
     if signed and is_of(recruiter, start.query, run_repository.parameters(session, other)):
         return other
     _refuse_by_id_alone(versions.get(session, other.version_id).experiment, other, start)
@@ -183,10 +183,10 @@ def _run_of_id(
 
 
 def count_code(resume_codes: RateLimit, link_token: str, typed: str) -> None:
-    """Count that a resume code was tried; refused where too many were.
+    """Count a try of a resume code; refuse it if there were too many.
 
-    Before the transaction of the start, which may be tried again for the sake of others in its group. For
-    each visit, so that who guesses at one keeps nobody from another.
+    Counted before the start's transaction, which the group commit may retry. Counted per visit, so that
+    guessing one code does not block others.
     """
     resume_codes.hit(f"{hash_token(link_token)}:{run_prefix(typed)}")
 

@@ -82,7 +82,7 @@ def checked_answers(form: Form, answers: Mapping[str, Any]) -> dict[str, Any]:
 
 def complete_run(versions: Versions, session: Session, token: str) -> Completion:
     """Close the run once everything is answered, and give the code; asking again gives the same."""
-    # The study first, as in a start: two requests that lock in two orders would wait for each other.
+    # Lock the study first, as a start does: locking in different orders could deadlock.
     study = run_repository.lock_study_of_run(session, token)
     run = find_run(session, token, lock=True)
     loaded = versions.get(session, run.version_id)
@@ -371,7 +371,7 @@ def save_form(
     asked = deciding_question(loaded.experiment)
     decides = asked is not None and asked.form == name
     if decides:
-        # The study first, as in a start: two requests that lock in two orders would wait for each other.
+        # Lock the study first, as a start does: locking in different orders could deadlock.
         run_repository.lock_study_of_run(session, token)
     run = open_run(session, token)
     need_consent(run)

@@ -29,7 +29,7 @@ _ZERO = 1 << _VALUE_BITS - 1
 
 
 class ClipTime(NamedTuple):
-    """How long the clips of a run's answers last, and when the first and last of it was.
+    """Total clip time of a run's answers, and the times of its first ticket, newest ticket and last answer.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class ClipTime(NamedTuple):
         )
 
     def same(self, other: "ClipTime") -> bool:
-        """True where both say the same, but for what sums differ by the order of their terms."""
+        """Equal up to rounding from the order of addition."""
         sums = zip(self[:2], other[:2], strict=True)
         # Moments are exact; sums of floats depend on the order of their terms.
         return self[2:] == other[2:] and all(math.isclose(one, two, abs_tol=1e-6) for one, two in sums)

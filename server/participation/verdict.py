@@ -21,8 +21,8 @@ INTERRUPTED = "interrupted"
 """A view that was broken off by a reload or a crash: the play has no answer."""
 ASSUMED_REFRESH_HZ = 60.0
 SHOWN_SHARE = 0.9
-"""Share of a frame's slack that the clock may be uneven by, by `make scope` (decision 0802), and of the time
-for which a frame stays: one that came later was not seen, whatever was declared."""
+"""A frame counts as seen only if its delay is at most this share of the time it stays on screen, whatever the
+study allows (measured by `make scope`, decision 0802)."""
 ROUNDING = 0.05
 """60 fps on a screen of 59.9 Hz counts as one refresh per frame."""
 
@@ -158,12 +158,12 @@ def _unevenness_ms(playback: Playback) -> float | None:
 
 
 def _limit_ms(allowed_ms: float, refresh_rate_hz: float | None, fps: float) -> float:
-    """How late a frame may be drawn and is still seen.
+    """The greatest delay at which a frame is still seen.
 
-    Beyond what is allowed to every frame that is most of the time for which it stays after its first refresh.
-    One that stays for a single refresh may come within most of it: pages draw so that no picture waits before
-    the screen. Where the rate was not measured it gets what is allowed alone: the screen may
-    be a faster one.
+    It is the allowed delay (at most 90% of a refresh) plus 90% of each refresh after the first. A frame that
+    stays for one refresh may always be delayed by 90% of it, because pages draw so that no picture waits for
+    the screen. If the refresh rate is unknown, 60 Hz is assumed, and only the allowed delay counts for a
+    frame of one refresh, because the screen may be faster.
     """
     refresh_ms = _refresh_ms(refresh_rate_hz)
     refreshes = max(1, _refreshes(refresh_rate_hz, fps))
@@ -181,7 +181,7 @@ def _refresh_ms(refresh_rate_hz: float | None) -> float:
 
 
 def frames_in_log(indices: Iterable[int]) -> int:
-    """Different frames drawn, each view counted for itself: an index below the one before begins a view."""
+    """Different frames drawn, counted separately per view: an index below the one before begins a view."""
     seen, latest, in_view = 0, -1, set[int]()
     for index in indices:
         # Frames of one view only ever increase, so that a smaller index is the next view's.

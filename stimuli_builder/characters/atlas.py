@@ -550,7 +550,7 @@ UNREADABLE = (
     *(tarfile.TarError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
     *(EOFError, OSError, KeyError, RuntimeError),
 )
-"""What archives end in that are damaged, or a zip file with a password."""
+"""Errors raised by damaged archives and by zip files with a password."""
 
 
 def _files_in_release(name: str, retired: Retired, release: Path) -> dict[str, bytes]:

@@ -102,7 +102,7 @@ def build(
 
 def _missing(planned: list[PlannedClip], state: BuildState) -> list[PlannedClip]:
     """The clips to render, each input once."""
-    # Turned round twice: of clips with one input the first of the design stays, in its place.
+    # Reversed twice: of clips with equal inputs the first of the design is kept, at the place of the last.
     by_hash = {clip.job.input_hash: clip for clip in reversed(planned)}
     return [clip for key, clip in reversed(by_hash.items()) if not state.intact(key)]
 

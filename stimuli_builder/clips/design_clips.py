@@ -129,13 +129,13 @@ def _parameters(settings: RenderSettings) -> Parameters:
 
 
 def _without_spontaneous(parameters: Parameters) -> Parameters:
-    # A law without an end does not exist; an interval beyond every clip does the same.
+    # A Law cannot be infinite; an interval longer than any clip has the same effect.
     never = {state: Law("fixed", NEVER_S) for state in parameters.intervals}
     return parameters.with_intervals(never)
 
 
 def _timer(length_s: float, mean_s: float, rng: np.random.Generator) -> list[float]:
-    """Blinks of a timer that runs already when the clip begins: in a long wait rather than a short one."""
+    """Blinks of a timer already running when the clip begins; long waits are more likely to be under way."""
     shortest, longest = (share * mean_s for share in TIMER_SHARES)
     times: list[float] = []
     # An interval is met in proportion to its length: its density is 2 t / (longest^2 - shortest^2).

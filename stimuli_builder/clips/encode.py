@@ -19,7 +19,7 @@ from experiments.errors import InputError
 CRF = 11.6
 PRESET = "faster"
 LESS_SEARCH = "subme=2:ref=1:weightp=0"
-"""Preset `faster` spends a third of its time on what pictures that hardly move do not need."""
+"""Otherwise `faster` spends a third of its time on searches that pictures with little motion do not need."""
 X264 = (
     f"{LESS_SEARCH}:threads=1:lookahead-threads=1:sliced-threads=0:bframes=0:keyint=infinite:scenecut=0:"
     "colorprim=bt709:transfer=bt709:colormatrix=bt709:range=tv:log-level=error"
@@ -28,11 +28,11 @@ BT709, LIMITED_RANGE = 1, 1
 M_PERTURB, ZEROES = -6, 255
 """Of glibc's mallopt: every block of memory is filled with the complement of this byte when it is taken."""
 RATED = f"{X264}:trellis=0:partitions=i8x8:aq-strength=0.6:me=dia"
-"""Less for smooth skin and a lower CRF give lids back what trellis gave them."""
+"""Fewer bits for smooth skin and a lower CRF keep the lids as sharp as with trellis."""
 _ALONE = f"{X264.replace('keyint=infinite', 'keyint=1')}:aq-mode=0:mbtree=0"
 
 
-# Decision 0912: Clips are encoded with CRF 12, `faster` and less search.
+# Decision 0912: Clips are encoded with CRF 11.6, `faster`, less search and no trellis.
 def encoder_signature(alone_qp: int | None = None) -> str:
     """Everything of the encoder that decides a clip's bytes; alone_qp as for `encode_clip`."""
     codec = ".".join(str(part) for part in av.library_versions["libavcodec"])
@@ -55,8 +55,8 @@ def encode_clip(
 
     One array shown several times in a row is one picture, taken over once.
     One GOP, no B-frames, constant rate, index in front of the data (fast start), BT.709 limited range. With
-    `alone_qp` every picture is coded by itself at this quantiser: it is decoded the same whatever the others
-    are, so that what coding leaves in it says nothing of them.
+    `alone_qp` every picture is coded separately at this quantizer: it is decoded the same whatever the others
+    are, so that coding artifacts reveal nothing about the other pictures.
 
     Raises
     ------

@@ -172,7 +172,7 @@ def of_declared_length(profile: BlinkProfile, settings: RenderSettings) -> Blink
 
 
 def _frames_30fps(settings: RenderSettings) -> float | None:
-    # Rounded to what a declaration can mean, free of binary rests.
+    # Rounded to what a declaration can mean, without binary rounding errors.
     return None if settings.blink_ms is None else round(settings.blink_ms * 30 / 1000, 9)
 
 
@@ -200,7 +200,7 @@ def _blink(
     separate = settings.eyes == "separate"
     kind = settings.profile
     if kind == "real":
-        # The last of so many: this exemplar.
+        # This exemplar is the last one drawn.
         return recorded_order(number, seed, family, paired=separate)[-1]
     if kind == "model":
         # A separate stream for each exemplar: more of them leave the others as they are.

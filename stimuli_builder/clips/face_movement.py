@@ -132,7 +132,7 @@ class Fissures:
         covered = np.full(opened.shape[:2], np.nan, np.float32)
         for index in chosen:
             picture = _blurred(character, int(index))
-            # Nearer to the shut picture than to the open one: no threshold that would hang on skin or
+            # Nearer to the shut picture than to the open one: no threshold that would depend on skin or
             # light.
             looks_shut = ((picture - opened) ** 2).sum(2) > ((picture - shut) ** 2).sum(2)
             # The first level that looks shut decides: later ones must not replace it.

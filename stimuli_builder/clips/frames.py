@@ -10,7 +10,7 @@ from experiments.errors import InputError
 from stimuli_builder.blinks.profile import PROFILE_FPS
 from stimuli_builder.clips.curves import Array, ClipCurve, samples_per_frame
 from stimuli_builder.clips.kernels import GAMMA, blend, split_planes, to_yuv
-from stimuli_builder.clips.levels import LevelSet
+from stimuli_builder.clips.levels import LevelSet, Picture
 from stimuli_builder.clips.life import EyeRegions, Life, moments_of, noise_of
 
 # Which samples of a 300 fps signal an output frame shows, and with what weight.
@@ -97,7 +97,6 @@ def read_barcode(luma: NDArray[np.uint8]) -> int | None:
 
 
 Planes = NDArray[np.uint8]
-Light = NDArray[np.float32]
 LUMA_SHARES = np.array([0.2126, 0.7152, 0.0722], np.float32)
 """BT.709."""
 PAINTED_KEPT = 16
@@ -142,7 +141,7 @@ class FramePainter:
                 painted.pop(next(iter(painted)))
             yield _numbered(picture, width, height, number) if barcode else picture
 
-    def light(self, curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> Light:
+    def light(self, curve: ClipCurve, samples: NDArray[np.int64], weights: NDArray[np.float64]) -> Picture:
         """(h, w, 3) linear light (of 65535) of the window: weighted mean over samples of the curve."""
         light = eye_light(self.character, curve, curve.closure, samples, weights)
         if curve.closure_other is None:
@@ -202,7 +201,7 @@ class FramePainter:
         """Where the character's eyes lie."""
         return regions_of(self.character)
 
-    def _seam(self) -> Light:
+    def _seam(self) -> Picture:
         window = self.character.window
         from_middle = np.arange(window.x, window.x + window.width) + 0.5 - self.character.size_px[0] / 2
         share = from_middle / (SEAM_MM * self.character.px_per_mm) + 0.5
@@ -231,7 +230,7 @@ def eye_light(
     closure: NDArray[np.float64],
     samples: NDArray[np.int64],
     weights: NDArray[np.float64],
-) -> Light:
+) -> Picture:
     """(h, w, 3) linear light (of 65535) of the window where both eyes follow one signal of the curve."""
     # Linear in light, so the mean over the shutter's time is one set of weights over levels.
     level_weights = weights @ character.level_weights(closure[samples])
@@ -240,7 +239,7 @@ def eye_light(
     flat = character.levels.reshape(len(character.levels), -1)
     light = np.empty(flat.shape[1], np.float32)
     blend(flat, chosen, level_weights[chosen].astype(np.float32), light)
-    picture: Light = light.reshape(character.levels.shape[1:])
+    picture: Picture = light.reshape(character.levels.shape[1:])
     vertical, horizontal = curve.lower_vertical_mm, curve.lower_horizontal_mm
     if character.read_lower is not None and vertical is not None and horizontal is not None:
         character.lower.add(picture, weights, closure[samples], vertical[samples], horizontal[samples])

@@ -2,19 +2,6 @@
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
-
-from stimuli_builder.blinks.profile import PROFILE_FPS
-from stimuli_builder.clips.curves import ClipCurve
-from stimuli_builder.clips.geometry import AS_BAKED, Movement
-from stimuli_builder.clips.life import LIFE_VERSION, draw_life
-
-if TYPE_CHECKING:
-    from stimuli_builder.clips.levels import LevelSet
 import multiprocessing
 import os
 import signal
@@ -24,11 +11,23 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor
 from concurrent.futures import wait as wait_for
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from multiprocessing.connection import wait
+from pathlib import Path
 from threading import Thread
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from experiments.errors import InputError
+from stimuli_builder.blinks.profile import PROFILE_FPS
+from stimuli_builder.clips.curves import ClipCurve
+from stimuli_builder.clips.geometry import AS_BAKED, Movement
+from stimuli_builder.clips.life import LIFE_VERSION, draw_life
+
+if TYPE_CHECKING:
+    from stimuli_builder.clips.levels import LevelSet
 
 RENDER_VERSION = 2
 """Raise this when the same inputs come to give other pictures; every clip is then built again."""
@@ -116,12 +115,14 @@ def render(job: ClipJob) -> bytes:
 
 # Rendering jobs on this machine's cores or on a Dask cluster; results are those of one process.
 
-# Which worker renders which job: a worker stays with a character, for reading one costs many clips.
+# Which worker renders which job: a worker stays with a character, because reading one takes as long as
+# rendering several clips.
 
 WORTH_READING = 32
 """Jobs that must wait elsewhere before a worker reads other levels for them.
 
-Reading takes as long as 5 (a baked face) to 16 clips (the cartoon), and two share what waits.
+Reading takes as long as rendering 5 (a baked face) to 16 clips (the cartoon), and the idle worker takes half
+of the waiting jobs.
 """
 
 

@@ -67,8 +67,8 @@ class LowerLid:
         for index, change in enumerate(layer.each_change()):
             part = placed(change)[rows, columns] * np.float32(FULL_SCALE / CHANGE_STEP)
             changes[index] = np.clip(np.rint(part), -32767, 32767)
-        # The poses' video need not be in the folder of the levels' video, from which the factors' shade is
-        # made.
+        # Free the memory of the poses' video before the factors are made: their shade needs only the levels'
+        # video.
         character.forget_poses()
         factors = np.empty((len(closures), *array_shape), np.uint16)
         for index in range(len(closures)):
@@ -224,5 +224,5 @@ def window_inside(x: float, y: float, width: float, height: float, size_px: tupl
 
 def quantise_light(light: NDArray[np.float32]) -> Light:
     """16-bit code of linear light in 0-1, clipped."""
-    # Half a step more, since the conversion to whole numbers cuts.
+    # Add half a step, because astype truncates.
     return (np.clip(light, 0.0, 1.0) * np.float32(FULL_SCALE) + np.float32(0.5)).astype(np.uint16)

@@ -67,8 +67,9 @@ export async function fetchRun(token: string): Promise<RunState> {
   return withoutPractice(await call<RunState>("GET", "/api/run", { token, timeout_ms: 30_000 }));
 }
 
-/** Under this name the tab counts how often the end led back to what was missing. */
+/** A notice appears if choosing the player takes longer than this. */
 const SEEN_MS = 1_500;
+/** The tab counts under this key how often the end of the study led back to unfinished parts. */
 export const RETURNED = "palpebra returns";
 
 /** From a started run to its timeline: what an earlier page left is sent, or counted, first. */

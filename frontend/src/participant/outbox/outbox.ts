@@ -20,7 +20,7 @@ export function backoff(failures: number, random: () => number = Math.random): n
   return full * (0.75 + 0.5 * random());
 }
 
-// What is sent next: the oldest write by itself; where there is none, events of one run together.
+// What is sent next: the oldest write, alone; if there is none, events of one run together.
 
 const events = "/api/run/events";
 // As many as the server takes in one call.
@@ -40,7 +40,7 @@ export function nextBatch(queue: readonly OutboxItem[]): Batch | null {
   if (write) return { method: write.method, path: write.path, token: write.token, body: write.body, items: [write] };
   const first = queue[0];
   if (!first) return null;
-  // A visit of before may have left events here, which go with its own token.
+  // An earlier visit may have left events; they are sent with that visit's token.
   const items = queue.filter((item) => item.token === first.token).slice(0, EVENTS_A_CALL);
   return { method: "POST", path: events, token: first.token, body: { events: items.map((item) => item.body) }, items };
 }

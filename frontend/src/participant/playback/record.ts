@@ -158,7 +158,7 @@ export function disturbancesOf(showings: readonly Pick<Showing, "disturbances">[
   return total;
 }
 
-/** As measured, or that of the fastest showing where the screen is faster than was believed; what is not known stays so. */
+/** The measured rate, or that of the fastest showing if that shows a faster screen; null if no rate was measured. */
 function rateShownAt(showings: readonly Showing[], measured_hz: number | null): number | null {
   if (!measured_hz) return null;
   const shortest_ms = Math.min(...showings.map((showing) => trueRefresh(showing.refresh_ms, 1000 / measured_hz)));
@@ -166,8 +166,8 @@ function rateShownAt(showings: readonly Showing[], measured_hz: number | null): 
 }
 
 /**
- * Frames drawn more than a refresh away from their time; early ones too, as where a clip ran fast. The refresh is that seen
- * meanwhile; where it is longer than was believed, as on a page that missed some, no frame may be later for that.
+ * Frames drawn more than a refresh away from their time; early ones too, as where a clip ran fast. The refresh is the one
+ * measured during the clip. If the page missed refreshes and so measured a longer one, that allows no extra delay.
  */
 function late({ method, drawn, fps, refresh_ms }: Showing, believed_ms: number): number {
   const start = drawn[0];

@@ -1,7 +1,7 @@
 /**
  * The view ledger: each view is on disk before its first frame, and on the server as soon as that can be reached.
- * What a page that died had begun, the next page ends as interrupted; what it had shown whole is answered without
- * another view.
+ * If a page dies during a view, the next page marks the view as interrupted. If the view was complete, the next page
+ * asks for the answer without showing the clip again.
  */
 import type { TrialInfo, ViewIn, ViewState } from "../../api/schema";
 import { clockTime, count, duration, frameLog, offset, pixels, within } from "../measured";
@@ -111,7 +111,7 @@ interface Span {
   ended_at_ms: number | undefined;
 }
 
-/** When the last showing drew its first and its last frame; not known of another page's, whose clips no key of this page follows. */
+/** When the last showing drew its first and last frame; undefined if an earlier page showed the clip: the answer did not follow it on this page. */
 export function spanOf(showings: readonly Shown[]): Span {
   const last = isFromBefore(showings) ? undefined : showings.at(-1);
   return { began_at_ms: last?.drawn[0]?.[1], ended_at_ms: last?.drawn.at(-1)?.[1] ?? last?.ended_at_ms };
