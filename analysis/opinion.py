@@ -300,7 +300,7 @@ def person_scores(
     return tuple(people)
 
 
-# Mean opinion scores with intervals, and a model of who gave them.
+# Mean opinion scores with intervals, and a model of the people who gave them.
 
 Repeats = Literal["mean", "votes"]
 

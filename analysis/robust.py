@@ -156,7 +156,7 @@ def _chunks(orders: Iterable[tuple[float, ...]]) -> Iterator[Floats]:
 # The aligned rank transform: an ANOVA of ranks that is right for interactions too.
 
 DIGITS = 9
-"""Values that agree to so many digits of the largest are ties: alignment adds rounding noise."""
+"""Values that agree to this many digits of the largest are ties: alignment adds rounding noise."""
 
 
 @dataclass(frozen=True)

@@ -461,7 +461,7 @@ def _against_references(votes: Votes, which: Codes, named: NDArray[Any], standar
             "reference's item in the rows of the other items"
         )
     scores = differential_scores(votes.scores, references, standard.highest or 0.0, standard.crush)
-    # Who did not rate the reference has no score on its items: the vote says nothing alone.
+    # A person who did not rate the reference has no score on its items: the vote says nothing alone.
     lost = np.isfinite(votes.scores) & ~np.isfinite(scores) & (references >= 0)
     decisions = list(votes.decisions)
     if lost.any():

@@ -39,7 +39,7 @@ from server.studies import endpoints as studies
 from server.web import RowSecurity, SecurityHeaders
 
 API_VERSION = "1"
-"""Of the API, not of the program: which weaknesses that may have is nobody's business who asks."""
+"""The version of the API, not of the program, whose version would help attackers."""
 
 
 def _routers() -> tuple[APIRouter, ...]:

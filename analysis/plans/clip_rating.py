@@ -196,7 +196,7 @@ def _ratings(prepared: PlanRows) -> Contents:
 PLAN = Plan(READING, check, contents, keys=("scale",))
 
 
-# Ratings on several scales: each analyzed for itself, and how far they measure the same.
+# Ratings on several scales: each is analyzed separately; Cronbach's alpha shows how far they agree.
 
 METHODS = (
     "Each scale is analyzed separately, as answered. Cronbach's alpha treats scales as items and the "

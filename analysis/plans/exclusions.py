@@ -116,8 +116,8 @@ class RuleVerdicts:
 def apply_exclusions(experiment: Experiment, ratings: StudyAnswers) -> Exclusions:
     """Set aside everything but main trials, then apply every declared rule.
 
-    Rules about participants see all their main trials; rules about trials see those of who remains. A
-    participant's second run is left out, the first that no rule excludes counts.
+    Rules about participants see all their main trials; rules about trials see those of the
+    remaining participants. A participant's second run is left out, the first that no rule excludes counts.
     """
     return judge_rows(experiment, ratings).under([True] * len(experiment.exclusions))
 

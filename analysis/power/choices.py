@@ -299,7 +299,7 @@ class ThresholdDesign:
         return float("nan") if outside else fitted
 
     def p_values(self, n: int, rng: np.random.Generator) -> Sequence[float]:
-        """The p of one data set of n people of the pool; who cannot be fitted is left out, as in a study."""
+        """The p of one data set of n people of the pool; people who cannot be fitted are left out."""
         drawn = self.differences[rng.integers(0, POOL, n)]
         given = drawn[np.isfinite(drawn)]
         if len(given) < 2 or np.ptp(given) == 0:

@@ -518,11 +518,11 @@ LINE_INCHES = 0.13
 """Height of a line of 7 points."""
 
 MAX_EFFECTS = len(COLOURS)
-"""Of more effects those with the smallest p as declared are drawn; the table has all."""
+"""If there are more effects, those with the smallest p as declared are drawn; the table has all."""
 
 
 def multiverse_picture(analysis: Analysis, result: "Multiverse") -> Picture:
-    """Draw p of the effects above a dot for each rule that was applied; choices ordered by who remains."""
+    """Draw p of the effects above a dot for each rule that was applied; choices ordered by people left."""
     order = sorted(result.universes, key=lambda u: (u.n_participants, u.n_ratings, u.applied), reverse=True)
     with mpl.rc_context(STYLE):
         p = np.array([universe.p_values for universe in order])

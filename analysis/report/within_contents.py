@@ -107,7 +107,7 @@ def _direction(analysis: Analysis, effect: Effect, differs: bool) -> str:
 # What an analysis of means found, in a few lines for the first page.
 
 MAX_LEVELS = 4
-"""Of a factor with more levels the highest and the lowest mean are named."""
+"""If a factor has more levels, only the highest and the lowest mean are named."""
 
 
 def brief(analysis: Analysis) -> tuple[str, ...]:

@@ -218,7 +218,7 @@ options = [
         return [rng.choice(self.options).value]
 
     def columns(self, name: str, asked: str, language: str) -> Mapping[str | None, Column]:
-        """Of each option, whether it was chosen."""
+        """For each option, whether it was chosen."""
         return {
             one.value: Column(
                 f"{name}_{plain_name(one.value)}",

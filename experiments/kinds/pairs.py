@@ -22,7 +22,7 @@ from experiments.declaration.paired_comparison import (
 from experiments.declaration.trial import ClipSpec
 from experiments.errors import InputError, did_you_mean
 
-# The pairs of a design: which clips are compared, whether they hang together, and who gets which.
+# The pairs of a design: which clips are compared, whether they are connected, and who gets which.
 #
 # Pure functions of the declaration. A pair is deterministic in its order; sides are dealt by `Deal`.
 

@@ -404,7 +404,7 @@ def verify(
     kept : tuple of int and str, optional
         A position and its hash, noted elsewhere, that the chain must hold.
     before : bytes, optional
-        A key of before, under which entries at the beginning may be.
+        An earlier key, under which entries at the beginning may be.
     """
     keys = _Keys(secret, before)
     erased_runs = repository.erased_runs(session)
@@ -427,7 +427,7 @@ def verify(
 
 
 class _Keys:
-    """The key of before, while entries fit it, and then for good the key of now."""
+    """The earlier key, while entries fit it, and then for good the present key."""
 
     def __init__(self, secret: bytes, before: bytes | None) -> None:
         self._now = chain_key(secret)

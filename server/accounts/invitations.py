@@ -1,4 +1,4 @@
-"""Invitations to have an account, and proof that who is signed in is the account's owner."""
+"""Invitations to have an account, and proof that the person signed in is the account's owner."""
 
 from datetime import timedelta
 
@@ -108,7 +108,7 @@ def invited_account(
     return add_account(session, name, password_hash, role, membership)
 
 
-# Who is signed in proves once more to be the account's owner, within the limits of wrong attempts.
+# The person signed in proves once more to be the account's owner, within the limits of wrong attempts.
 
 
 async def must_fit(

@@ -300,7 +300,7 @@ def bring_up_to_date(
         )  # fmt: skip
 
 
-# Who is let in that has no login here yet: by a rule of the declared provider, or by an invitation.
+# Which people without a login here are let in: by a rule of the declared provider, or by an invitation.
 
 _NOT_IN_A_NAME = re.compile(r"[^\w.@+ -]+")
 MAX_NAME = 90

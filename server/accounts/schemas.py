@@ -294,7 +294,7 @@ class BeginSignIn(RequestBody):
 
 
 class BeginLink(RequestBody):
-    """Who asks proves that she is the account's own person, not only somebody at her open browser."""
+    """The sender proves to be the account's owner, not only somebody at the owner's open browser."""
 
     proof: Annotated[str, StringConstraints(min_length=1, max_length=200)] = Field(
         description="The current password; for accounts without a password, a code of the second factor."

@@ -1,7 +1,7 @@
 """Who may try to sign in how often: by no internet address in clear; on PostgreSQL in all processes together.
 
 Nobody's wrong passwords keep another out: waiting times hold for a name *from one range of addresses*.
-A browser that signed in before carries a device cookie and is counted by itself, whatever others do to
+A browser that signed in before carries a device cookie and is counted separately, whatever others do to
 its name. Names that do not exist are counted as those that do.
 """
 

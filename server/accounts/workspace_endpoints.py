@@ -25,7 +25,7 @@ workspace_router = APIRouter(prefix="/api/admin/workspaces", tags=["workspaces"]
 
 @workspace_router.get("")
 def list_workspaces(database: DatabaseDep, identity: Myself) -> list[WorkspaceOut]:
-    """The workspaces one belongs to; all of them for who manages the server."""
+    """The workspaces one belongs to; all of them for people who manage the server."""
     with database.read() as session:
         return workspaces.list_workspaces(session, identity)
 
@@ -80,7 +80,7 @@ def remove_member(database: DatabaseDep, identity: Myself, workspace: str, accou
         )
 
 
-# Grants on a study, and the workspace it belongs to: for who owns the study.
+# Grants on a study, and the workspace it belongs to: for the study's owners.
 
 grant_router = APIRouter(prefix="/api/admin/studies/{study}", tags=["workspaces"], responses=ERROR_RESPONSES)
 

@@ -69,13 +69,13 @@ def _lock_of_file(path: Path) -> FileLock:
 # One connection of a process holds all of its locks, however many there are; another lets others see
 # whether a lock is held. A host that goes without a word lets go of its locks within a minute. Where
 # PostgreSQL is restarted, the process notices within `HEARTBEAT_S` and takes its locks again; where the
-# network was cut, as soon as PostgreSQL has noticed too, and ended the connection of before that still
+# network was cut, as soon as PostgreSQL has noticed too, and ended the earlier connection that still
 # holds them.
 
 LOG = logging.getLogger(__name__)
 HEARTBEAT_S = 5.0
 OWN_LINE_S = 60.0
-"""By then a connection of before has ended for PostgreSQL too: whatever holds a lock now is another's."""
+"""By then an earlier connection has ended for PostgreSQL too: whatever holds a lock now is another's."""
 _ALIVE = "SET tcp_keepalives_idle = 20; SET tcp_keepalives_interval = 10; SET tcp_keepalives_count = 3"
 
 
@@ -175,7 +175,7 @@ class DatabaseLocks:
         return self._connection
 
     def _regain(self, connection: Connection) -> None:
-        """Ask for the locks that were lost with a connection; one of before may hold them a little longer."""
+        """Ask for the locks that were lost with a connection; the lost one may hold them a little longer."""
         connection.exec_driver_sql("SELECT 1")
         for number, since in list(self._lost.items()):
             if connection.scalar(text("SELECT pg_try_advisory_lock(:number)"), {"number": number}):

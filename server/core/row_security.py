@@ -125,7 +125,7 @@ NOT_OF_A_STUDY = frozenset(
         "login_attempts", "mailed_links", "shared_counts", "workspace_members", "workspaces",
     )
 )  # fmt: skip
-"""Tables that hang on no study. Clips are shared by studies, and known by the hash of their bytes."""
+"""Tables that belong to no study. Clips are shared by studies, and known by the hash of their bytes."""
 _OWN = "study_id = ANY ((SELECT palpebra_studies())::integer[])"
 _PARENTS = {
     "study_run_id": "study_runs",
@@ -202,7 +202,7 @@ def raise_wall(connection: Connection, *, stood: bool = False) -> bool:
 
 
 def _carry_out_all(connection: Connection, statements: list[str], stood: bool) -> bool:
-    """Whether the statements could be carried out, all or none; a wall of before is not left half-built."""
+    """Whether the statements could be carried out, all or none; an earlier wall is not left half-built."""
     try:
         with connection.begin_nested():
             take_down_wall(connection)

@@ -80,7 +80,7 @@ def report_out(settings: Settings, locks: Locks, job: Job) -> ReportOut:
 
 
 def _origin_of_older(parameters: dict[str, Any]) -> str:
-    # Reports of before there were origins were of a phase.
+    # Reports made before there were origins have a phase instead.
     return "pilot" if parameters.get("phase") == "pilot" else "participant"
 
 

@@ -152,7 +152,7 @@ def _values(session: Session, run: StudyRun, forms: Sequence[FormColumn]) -> dic
 
 
 def _calibration(session: Session, run: StudyRun) -> dict[str, Any]:
-    """How the latest size and distance were measured; nothing where none were, or by a page of before."""
+    """How the latest size and distance were measured; nothing if none were, or by an earlier page."""
     every = calibrations(session, run)
     rechecks = [one.recheck_percent for one in every if one.recheck_percent is not None]
     latest = every[-1] if every else None

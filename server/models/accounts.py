@@ -174,7 +174,7 @@ class Workspace(Base):
     Attributes
     ----------
     second_factor_required : bool
-        Its studies open only to who signed in with a second factor.
+        Its studies open only to people who signed in with a second factor.
     """
 
     __tablename__ = "workspaces"

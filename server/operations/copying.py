@@ -155,7 +155,7 @@ def carry_over(session: Session, old: bytes, secret: bytes) -> RekeyedSecrets:
 
 
 def _carry_factors(session: Session, old: bytes, secret: bytes) -> int:
-    """Of a log that fits; who set one up since the key was changed did so under the key of now."""
+    """Carry over second factors, except those set up under the new key; returns how many."""
     of_now = {
         entry.account_id
         for entry in entries_under_key(session, secret)

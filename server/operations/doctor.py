@@ -99,7 +99,7 @@ def _drill_finding(watched: WatchedBackups) -> Finding:
 
 
 def snapshots(services: Services) -> Iterator[Finding]:
-    """Snapshots are taken where the settings ask for them; no database of before is forgotten."""
+    """Snapshots are taken where the settings ask for them; no replaced database is forgotten."""
     settings = services.settings
     if not services.database.is_sqlite:
         if settings.snapshot_minutes:
@@ -432,7 +432,7 @@ def people(services: Services) -> Iterator[Finding]:
 
 
 def tokens(services: Services) -> Iterator[Finding]:
-    """API tokens of before they had to end within a year."""
+    """API tokens made before they had to end within a year."""
     with services.database.read() as session:
         named = repository.tokens_ending_after(session, now() + timedelta(days=TOKEN_DAYS_MAX))
     if named:

@@ -40,7 +40,7 @@ AGAIN_AFTER_FAILURE = timedelta(days=1)
 COPIES = ".drill-"
 """How folders of copies begin."""
 UNPACKED = 15
-"""Rows in a database take up to so many times the room of their compressed text."""
+"""Rows in a database take up to this many times the room of their compressed text."""
 
 
 class DrillUnderWayError(InputError):
@@ -56,7 +56,7 @@ def drill(
     """Restore a backup next to the data and examine it; the result is kept, what was restored is removed.
 
     The database is SQLite whatever the server's is: a backup has neither's form. Nothing of the server's own
-    data is touched; who was erased since the backup is erased from the copy too, before it is looked at.
+    data is touched; people erased since the backup are erased from the copy too, before it is looked at.
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ def set_run_keys(connection: Connection, keys: Mapping[str, str]) -> tuple[int, 
 
 # What no backup holds: the keys of recruiters' IDs and of pseudonyms, in one file that each backup replaces.
 #
-# Who is erased has no key in the next key file, so that what older backups hold of the id opens no more,
+# The next key file has no key of an erased person, so that what older backups hold of the id opens no more,
 # wherever they are. The keys are wrapped (AES key wrap) under the secret key, which backups hold: neither
 # file opens a recruiter's ID without the other, and a guessed id cannot be tried against the pseudonyms of a
 # backup alone.
@@ -162,7 +162,7 @@ def check_fits(keys: KeyFile, secret: bytes, backed_up_at: str, name: str, *, st
 def write_keys(path: Path, keys: KeyFile) -> None:
     """Replace the key file unless a later backup wrote it; mode 600.
 
-    A backup that another overtook would bring back the keys of who was erased since.
+    A backup that another overtook would bring back the keys of people erased since.
     """
     if path.exists() and keys.written_at < key_file(path).written_at <= iso(now()):
         return

@@ -74,7 +74,7 @@ def tokens_ending_after(session: Session, latest: datetime) -> list[tuple[str, s
 
 
 def recruiters(session: Session) -> list[tuple[str, bool, dict[str, Any] | None]]:
-    """Each stored recruiter: its study's name, whether a link of it has it for itself, what is declared."""
+    """Each stored recruiter: its study's name, whether it is of a single link, and what is declared."""
     of_studies = select(Study.name, Study.recruiter).where(Study.recruiter.is_not(None)).order_by(Study.id)
     of_links = select(Study.name, Link.recruiter).join(Study, Study.id == Link.study_id).order_by(Link.id)
     of_links = of_links.where(Link.recruiter.is_not(None), Link.revoked_at.is_(None))

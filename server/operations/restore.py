@@ -127,7 +127,7 @@ def _not_covered(settings: Settings, copy: Path, described: Description) -> Inpu
 
 
 def _take_over_ledger(settings: Settings, path: Path) -> None:
-    """Who was erased after the backup is in the copy of the ledger next to it, if it was written since."""
+    """People erased after the backup are in the copy of the ledger next to it, if it was written since."""
     if path.is_file() and path != ledger_path(settings):
         add_to_ledger(settings, path.read_bytes())
 

@@ -120,12 +120,12 @@ def snapshots_of(settings: Settings) -> list[Snapshot]:
 
 
 def path_aside(database: Path, moment: datetime) -> Path:
-    """What the database of before is called once another took its place."""
+    """The file name of the earlier database after another replaced it."""
     return database.with_name(f"{database.stem}{_BEFORE}{moment:%Y-%m-%dT%H%M%SZ}{database.suffix}")
 
 
 def set_aside(settings: Settings) -> list[Path]:
-    """The databases of before, oldest first."""
+    """The replaced databases, oldest first."""
     path = database_file(settings)
     return sorted(path.parent.glob(f"{path.stem}{_BEFORE}*{path.suffix}"))
 
@@ -284,7 +284,7 @@ def snapshot_at(settings: Settings, moment: datetime) -> Snapshot:
 
 
 def go_back(settings: Settings, snapshot: Snapshot, told: Callable[[str], None]) -> Path:
-    """Put a snapshot in the place of the database; return where the database of before was set aside.
+    """Put a snapshot in the place of the database; return where the replaced database was set aside.
 
     The snapshot is copied, brought to the newest revision and the ledger of erasures carried out in it before
     anything is moved, so that nothing is changed where any of it fails.

@@ -59,7 +59,7 @@ from server.participation.versions import Versions
 # The participant's side of the API: links, runs, forms, events. A run's token is its only credential.
 
 RUN_START_WEIGHT = 8
-"""A run start takes about as long as so many ratings."""
+"""A run start takes about as long as this many ratings."""
 router = APIRouter(prefix="/api", tags=["participants"], responses=ERROR_RESPONSES)
 _bearer = HTTPBearer(auto_error=False, description="The run token of POST /api/links/{link_token}/runs.")
 

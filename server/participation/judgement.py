@@ -30,7 +30,7 @@ from server.studies.lookup import definition_of
 
 def judge_run(session: Session, run: StudyRun) -> Judgement:
     """The judgement on a run as it is stored; runs whose page was not asked for evidence are not judged."""
-    # Of an erased run only counts are left: a new verdict would be made of nothing.
+    # Only counts are left of an erased run: a new verdict would have no data.
     if run.evidence != "asked" or run.erased_at is not None:
         return NOT_JUDGED
     rows = evidence_repository.answers(session, run)

@@ -68,7 +68,7 @@ def open_turns(
     if not quotas or origin not in COUNTED_ORIGINS:
         return turns
     lease = timedelta(minutes=experiment.session.lease_minutes)
-    # Each origin for itself: pilot runs must not take the places that people are recruited for.
+    # Each origin separately: pilot runs must not take the places that people are recruited for.
     taken = run_repository.places_by_group(session, version_id, origin, lease)
     return [turn for turn in turns if every[turn] not in quotas or taken[every[turn]] < quotas[every[turn]]]
 

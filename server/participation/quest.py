@@ -103,7 +103,7 @@ def tilt(model: Model, counts: Mapping[Point, tuple[int, int]]) -> Tilt:
 
 @lru_cache(maxsize=64)
 def _likelihoods(model: Model) -> dict[Point, tuple[Any, Any]]:
-    """Of both answers at every stimulus, over the parameters in the order of the prior."""
+    """Likelihoods of both answers at every stimulus, over the parameters in the order of the prior."""
     engine = _engine(model)
     return {
         point: tuple(

@@ -19,14 +19,13 @@ from server.participation.refusals import IdentifierInvalid, RecruiterNotSet, Si
 #
 # A study's (or link's) `recruiter` is an object with these keys, all but `kind` optional: kind: prolific,
 # sona, mturk or generic. id_parameter: which address parameter names the participant. redirect_url: where
-# to go at the end; {code}, {run} and {any address parameter} are filled in. redirect_declined: where to go
-# who takes no part: does not agree, or has no device that will do; without it Prolific's own page,
-# elsewhere none. redirect_screened_out: where to go when screened out; on Prolific redirect_url, where
-# there is a code for it. code_complete, code_failed_check: completion codes; one is made for each run where
-# absent. code_screened_out: of who is screened out; without it none is shown, so that nobody is paid by
-# mistake. signature_parameter: which address parameter has the signature of the participant's id
-# (here, below); without it addresses are not signed. secret_name: another name makes
-# another secret.
+# to go at the end; {code}, {run} and {any address parameter} are filled in. redirect_declined: where people
+# go who do not agree, or whose device is not suitable; without it Prolific's own page, elsewhere none.
+# redirect_screened_out: where to go when screened out; on Prolific redirect_url, if there is a code for it.
+# code_complete, code_failed_check: completion codes; one is made for each run where absent.
+# code_screened_out: the code of people who are screened out; without it none is shown, so that nobody is paid
+# by mistake. signature_parameter: which address parameter has the signature of the participant's id (here,
+# below); without it addresses are not signed. secret_name: another name makes another secret.
 
 Code = Annotated[str, StringConstraints(max_length=100)]
 Address = Annotated[str, StringConstraints(max_length=1000, pattern=r"^(https?://.*)?$")]
@@ -119,11 +118,11 @@ class Recruiter(BaseModel):
         return _filled_in(address, code, run, parameters)
 
     def way_back(self) -> str | None:
-        """The address for who takes no part, {address parameters} not filled in; None where there is none."""
+        """The address for people who take no part, {address parameters} not filled in; None without one."""
         return self.redirect_declined or (PROLIFIC_HOME if self.kind == "prolific" else None)
 
     def redirect_screened_out_to(self, run: str, parameters: Mapping[str, str]) -> str | None:
-        """The address for who is screened out. Never the ordinary one of itself: it may grant a credit."""
+        """The address for people screened out; the ordinary one only with a code: it may grant a credit."""
         if self.redirect_screened_out:
             return _filled_in(self.redirect_screened_out, self.code_screened_out, run, parameters)
         by_code = self.kind == "prolific" and self.code_screened_out
@@ -170,7 +169,7 @@ def without_refused(recruiter: Recruiter, stored: Mapping[str, Any] | None = Non
     Parameters
     ----------
     stored : mapping, optional
-        The recruiter of before. An address in it that is refused today may be sent again as it is: a study
+        The earlier recruiter. An address in it that is refused today may be sent again as it is: a study
         with one can be paused.
 
     Raises

@@ -72,7 +72,7 @@ class LinkState(BaseModel):
     resumable: bool = Field(description="A run of this personal link is under way and can be taken up again.")
     screens_devices: bool = Field(description="A closed gate ends the visit as screened out.")
     way_back: str | None = Field(
-        description="The recruiter's address for who takes no part, its {address parameters} not filled in."
+        description="The recruiter's address for people who take no part, {address parameters} not filled in."
     )
     gates: Gates
 
@@ -246,7 +246,7 @@ class Consent(BaseModel):
 class CalibrationResult(BaseModel):
     """One size calibration; each is kept, the latest counts.
 
-    What has a default was not sent by the pages of before.
+    Keys with a default were not sent by earlier pages.
     """
 
     # 200 px per mm is about 5000 dpi, ten times the finest phone.

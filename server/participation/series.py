@@ -102,7 +102,7 @@ def outlook_after(loaded: LoadedVersion, trials: Sequence[Any], answers: Sequenc
     experiment = loaded.experiment
     assumed, declared, levels = model(experiment), threshold_of(experiment), points(experiment)
     shown, known = loaded.once(_points), dict[str, int]()
-    # Each series for itself: its choices rest on its own answers, as those of separate experiments would.
+    # Each series separately: its choices depend only on its own answers, as in separate experiments.
     offers: list[Offer] = []
     estimates: dict[tuple[int, int], Estimate] = {}
     closing: list[int] = []
@@ -214,7 +214,7 @@ def _stimulus_role(loaded: LoadedVersion, trial: Trial) -> str:
 
 
 def places(connection: Connection, run: int, loaded: LoadedVersion) -> list[tuple[int, int, int, int, bool]]:
-    """Of each trial in a series: index, number of the series, position, answers known, whether closed."""
+    """For each trial in a series: index, number of the series, position, answers known, whether closed."""
     numbers = {one.name: number for number, one in enumerate(series_of(loaded.experiment))}
     latest = series_repository.latest_offers(connection, run)
     return [

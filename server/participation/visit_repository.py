@@ -1,4 +1,4 @@
-"""Runs and all that hangs on them."""
+"""Runs and all that belongs to them."""
 
 from collections.abc import Sequence
 from datetime import datetime

@@ -110,7 +110,7 @@ def waiting_warning(connection: Connection, run: int, experiment: Experiment) ->
 def warning_of(
     connection: Connection, run: int, experiment: Experiment, rating_id: str
 ) -> WarningShown | None:
-    """The warning that a stored answer led to: who did not get the receipt asks for it again."""
+    """The warning that a stored answer led to; a page that did not get the receipt asks for it again."""
     if not experiment.warnings.rules:
         return None
     data = rating_repository.event_data(connection, run, _event_id(rating_id))

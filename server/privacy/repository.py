@@ -58,7 +58,7 @@ def runs_known_as(session: Session, study: Study, identifier: str) -> list[Study
 
 
 def stored_rows(session: Session, run: StudyRun) -> dict[str, list[dict[str, Any]]]:
-    """Table -> the rows that hang on a visit, its own and its link's included; empty tables are left out.
+    """Table -> the rows that belong to a visit, its own and its link's included; empty tables are left out.
 
     Codes that pay are shown once the visit is complete.
     """

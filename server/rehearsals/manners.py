@@ -29,7 +29,7 @@ from server.rehearsals.person import SEES_MOTION, Person, Rater, still_due, view
 
 # Manners of taking part: how people and programs act between two answers, seeded.
 #
-# Each is a model of who answers; the points of server/participation/evidence.py were set by them. A second
+# Each is a model of a participant; the points of server/participation/evidence.py were set by them. A second
 # set, written apart, tests them (tests/server/evidence).
 
 Interaction = dict[str, Any]
@@ -154,8 +154,8 @@ MANNERS: dict[str, Manner] = {
 """http: plain HTTP. http-slow: HTTP with plausible waits and fetched clips. script: a headless browser whose
 page a script clicks. frames: a driven browser that answers from single frames. flow: one that computes
 optical flow, and so sees what motion checks show. careless: a person, fast and always the same. honest: a
-person whose network goes away, who reloads, whose clock jumps. assistive: a screen reader. scripted: a
-browser that a script clicks, on a machine whose other work lengthens its presses."""
+person whose network fails, who reloads the page, or whose clock jumps. assistive: a screen reader.
+scripted: a browser that a script clicks, on a machine whose other work lengthens its presses."""
 
 
 # A simulated person with a manner: sends evidence, at times of a separate clock.
@@ -294,7 +294,7 @@ class Actor(Person):
         }
 
     def _view(self, trial: dict[str, Any], body: dict[str, Any], clips_s: float) -> dict[str, Any] | None:
-        """The view of a trial that has ended; None from who sends no tickets, and where nothing was shown."""
+        """The view of a trial that has ended; None without tickets, and where nothing was shown."""
         evidence = body.get("evidence")
         if evidence is None or not trial["clip_sha256"]:
             return None

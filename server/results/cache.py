@@ -83,7 +83,7 @@ class ResultsCache:
     def _count_quietly(self, key: Key, revision: Revision, count: Count) -> None:
         try:
             self._count_once(key, revision, count)
-        except Exception as error:  # nobody waits for it; who asks next gets the error
+        except Exception as error:  # nobody waits for it; the next request gets the error
             log.error("results could not be counted: %s", type(error).__name__)
             with self._lock:
                 self._kept.pop(key, None)

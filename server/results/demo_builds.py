@@ -91,7 +91,7 @@ def start_clip_build(
 
 @contextmanager
 def _only_one(locks: Locks) -> Iterator[None]:
-    """Of two requests at once the second is refused: each would see no build under way."""
+    """The second of two simultaneous requests is refused: each would see no build under way."""
     try:
         with locks.held(KIND):
             yield

@@ -116,7 +116,7 @@ def stimulus_counts(session: Session, of: Pool) -> list[StimulusCount]:
 
 
 def person_counts(session: Session, of: Pool) -> list[PersonCount]:
-    """As `stimulus_counts`, of each run by itself."""
+    """As `stimulus_counts`, separately for each run."""
     positive = func.sum(case((SeriesAnswer.correct.is_(True), 1), else_=0))
     keys = (SeriesAnswer.study_run_id, SeriesTrial.series, SeriesAnswer.value, VersionClip.cell)
     answers = _series_answers(of, *keys, func.count(), positive)

@@ -221,7 +221,7 @@ class AnsweredCell(BaseModel):
 
 
 class OtherResults(StudyResults):
-    """Of a kind of trial without its own summary."""
+    """The results of a kind of trial without its own summary."""
 
     kind: Literal["other"] = "other"
     note: str

@@ -58,7 +58,7 @@ def results(session: Session, study: Study, version: StudyVersion, of: Pool) -> 
         scales=[_scale_out(one) for one in scales_of(definition)],
         scale=_scale_out(scale),
         bins=bins,
-        # Of a dealt factor a participant has some levels only, as of one between participants.
+        # A participant has only some levels of a dealt factor, as of one between participants.
         margins=margins(
             tally.means, factors, [one.name for one in definition.factors if one.between or one.dealt]
         ),

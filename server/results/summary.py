@@ -68,8 +68,8 @@ def margin(
 ) -> list[MarginMean]:
     """Marginal means of the factors in `keep`, over the participants who have every one of those levels.
 
-    Cells of a participant are averaged without weights. Error bars: `within_participant_errors`, each
-    group for itself where `keep` has factors of `between`, of which a participant has one level or some.
+    Cells of a participant are averaged without weights. Error bars: `within_participant_errors`, computed
+    per group if `keep` has factors of `between`, of which a participant has one level or some.
     """
     fixed = [factors.index(name) for name in keep if name in between]
     groups: dict[tuple[str, ...], list[RatersOfSameCells]] = {}

@@ -290,7 +290,7 @@ def first_general_link(session: Session, study: Study, group: str) -> Link | Non
 
 
 def recruiters_of_links(session: Session, study: Study) -> list[dict[str, Any]]:
-    """The recruiters that links of a study have for themselves, each once."""
+    """The recruiters declared for single links of a study, each once."""
     query = select(Link.recruiter).where(
         Link.study_id == study.id, Link.revoked_at.is_(None), Link.kind != "preview"
     )

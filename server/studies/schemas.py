@@ -510,7 +510,7 @@ class NewLinks(RequestBody):
     kind: Literal["general", "personal", "preview"]
     label: Label = ""
     group: Annotated[str, StringConstraints(max_length=600)] = Field(
-        default="", description="Group of who comes by it, where links decide."
+        default="", description="Group of the people who come by it, where links decide."
     )
     labels: list[Label] = Field(default=[], max_length=5000)
     count: Annotated[int, Field(ge=1, le=5000)] = 1
@@ -525,7 +525,7 @@ class LinkOut(BaseModel):
     id: str
     kind: str
     label: str
-    group_name: str = Field(description="Group of who comes by it; empty where links decide none.")
+    group_name: str = Field(description="Group of the people who come by it; empty where links decide none.")
     url: str
     quota: int | None
     expires_at: datetime | None

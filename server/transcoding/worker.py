@@ -23,7 +23,7 @@ LOOK_SHARE = 20
 """The folders are read again after at least 20 times as long as reading them took."""
 
 MAX_A_PROCESS = 64
-"""A process does at most so many files one after the other."""
+"""A process converts at most this many files, one after the other."""
 
 Video = tuple[Path, Path]
 """The folder of an upload, and one of its files."""

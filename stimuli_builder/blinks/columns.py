@@ -468,7 +468,7 @@ TOP_PERCENTILE = 99.5
 RESTS_HIGH = 0.6
 """A series that is named as a closure and rests above this part of its top is none, or of shut eyes."""
 GLITCH, GLITCHES = 2.0, 3
-"""A greatest value that is so many times the third greatest is a glitch, and no level of a shut lid."""
+"""A greatest value that is this many times the third greatest is a glitch, and no level of a shut lid."""
 _WAYS = "add --inverted if high means closed, --not-inverted if high means open"
 
 

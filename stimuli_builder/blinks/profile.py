@@ -183,7 +183,7 @@ def resample_phases(profile: BlinkProfile, down_frames: int, up_frames: int) -> 
     if down_frames < 1 or up_frames < 1:
         raise InputError(f"a phase needs one frame or more, got {down_frames} down and {up_frames} up")
 
-    # Each phase by itself, so that the minimum stays where it belongs.
+    # Each phase separately, so that the minimum stays where it belongs.
     def rescale(closure: Array) -> Array:
         middle = profile.minimum_index
         down = phase_spline(closure[profile.onset_index : middle + 1], down_frames)

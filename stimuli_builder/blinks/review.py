@@ -17,7 +17,7 @@ from stimuli_builder.blinks.series import scaled_frames
 
 Decision = Literal["accept", "reject"]
 MATCH_FRAMES = 10
-"""A decision belongs to the blink whose minimum is within so many frames (at 300 fps) of the decision's."""
+"""A decision belongs to the blink whose minimum is within this many frames (at 300 fps) of the decision's."""
 
 
 EDGE_COLUMNS = ("onset_frame", "end_frame")

@@ -38,7 +38,7 @@ RESAMPLED = "resampled"
 UNITS = (("s", 1.0, 0.9), ("ms", 1e-3, 200.0), ("µs", 1e-6, 2e5), ("ns", 1e-9, np.inf))
 """Units of times, their seconds, and the step below which a series is in them."""
 HOLE_STEPS = 2.5
-"""A step of more than so many usual ones, and of more than `MAX_BRIDGED_MS`, is a hole: one frame that was
+"""A step of more than this many usual ones, and of more than `MAX_BRIDGED_MS`, is a hole: one frame that was
 dropped is bridged, and of a blink, which lasts for some 300 ms, no more than at 15 frames a second."""
 MAX_FRAMES = 20_000_000
 """23 hours at 240 frames a second, holes included."""

@@ -33,7 +33,7 @@ LID_ROWS = np.linspace(-0.25, 0.15, 81)
 LID_COLUMNS = np.linspace(-0.1, 0.1, 21)
 MARGIN_ROWS = 5
 MARGIN_SHARE = 0.97
-"""The skin moves nearly as far as the margin over so many rows above it; below lie lashes and the eye."""
+"""The skin moves nearly as far as the margin over this many rows above it; below lie lashes and the eye."""
 NOT_FOLLOWED = "the motion of the lids cannot be followed in the blink; label frames by hand"
 
 
@@ -130,7 +130,7 @@ NEAR_ROWS, FAR_ROWS, STEP_ROWS = (round(share / EDGE_STEP) for share in (0.015, 
 """How far above and below an edge the skin and the eye are looked at, and its step is measured."""
 SMOOTH_ROWS = 2.5
 REACH = round(0.02 / EDGE_STEP)
-"""In a single picture, the edge is looked for so many rows around where the motion has it."""
+"""In a single picture, the edge is looked for this many rows around where the motion has it."""
 NEARLY_SHUT, LOW_REACH = 0.2, round(0.06 / EDGE_STEP)
 """Below this share of the travel the motion counts less and less, and edges are looked for farther away."""
 HALF_SHUT = (0.05, 0.5)
@@ -138,7 +138,7 @@ HALF_SHUT = (0.05, 0.5)
 LEAST_OPENING = 0.05
 """The lower lid is looked for so far below the upper one of open eyes, in eye widths."""
 LEAST_CONTRAST = 1.3
-"""Where skin is not so many times brighter than the eye, its edge cannot be trusted."""
+"""Where skin is not this many times brighter than the eye, its edge cannot be trusted."""
 DARK_CODE = 10.0
 """Added before logarithms: what is darker is noise."""
 

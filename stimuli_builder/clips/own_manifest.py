@@ -232,7 +232,7 @@ def _clip(record: Prepared, levels: dict[str, str], exemplar: int, factors: tupl
 ALIKE = 0.7
 """Ratio of `SequenceMatcher` from which two levels may be one, misspelt: 0.75 of slow and slwo."""
 RARER = 3
-"""A level is taken for a slip of another that has so many times its clips."""
+"""A level is taken for a slip of another that has this many times its clips."""
 MAX_SLIPS_NAMED = 8
 _NUMBERED = re.compile(r"(.+?)([_\- .]?)(\d+)")
 

@@ -85,7 +85,7 @@ CANDIDATES = 12
 QUAD_TOLERANCE = 0.06
 FIELD_PX = 16
 MIDDLE = slice(5, 11)
-"""Of a straightened field of 16 pixels only the middle is read: its rim mixes with the neighbors."""
+"""Only the middle of a straightened field of 16 pixels is read: its rim mixes with the neighbors."""
 
 
 def range_of(pictures: Iterable[Grey]) -> Grey:
@@ -206,7 +206,7 @@ Readings = list[tuple[Corners, NDArray[np.float64]]]
 
 
 def _brightness(path: Path, quads: list[Corners]) -> Readings:
-    """Of each place the fields' brightness in every picture."""
+    """For each place, the fields' brightness in every picture."""
     values: list[list[NDArray[np.float64]]] = [[] for _ in quads]
     if quads:
         for picture in _pictures(path):

@@ -178,7 +178,7 @@ class Trace:
 
 @dataclass(frozen=True)
 class Changes:
-    """Of each play the times at which the field changed, in ms: the onset of frames 0, 1, 2 and so on."""
+    """For each play, the times in ms at which the field changed: the onset of frames 0, 1, 2 and so on."""
 
     plays: tuple[tuple[float, ...], ...]
     period_ms: float

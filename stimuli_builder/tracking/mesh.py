@@ -116,7 +116,7 @@ def build_mesh(mean: Points, base_pixels: int) -> BaseMesh:
     """
     eyes = len(mean) // (EYE_POINTS + BORDER_POINTS)
     groups = [_eye_vertices(eye, eyes) for eye in range(eyes)]
-    # Each eye for itself: one triangulation of both would stretch triangles over the nose.
+    # Each eye separately: one triangulation of both would stretch triangles over the nose.
     triangles = [group[Delaunay(mean[group]).simplices] for group in groups]
     area = sum(_area(mean, part) for part in triangles)
     scale = float(np.sqrt(base_pixels / area))

@@ -23,7 +23,7 @@ PANEL_PX = 96
 SECONDS = 2.0
 MESH, OUTLINE, TEXT = (70, 150, 90), (90, 255, 120), (235, 235, 235)
 TRACES = ((90, 170, 255), (255, 180, 70))
-# OpenCV draws at fractions of a pixel when coordinates are shifted by so many bits.
+# OpenCV draws at fractions of a pixel when coordinates are shifted by this many bits.
 SHIFT = 4
 
 
@@ -62,7 +62,7 @@ def _status(row: dict[str, str]) -> str:
 
 
 def _draw_mesh(canvas: Picture, points: Points, triangles: NDArray[np.int64]) -> None:
-    # Of a lost frame there is nothing to draw.
+    # A lost frame has nothing to draw.
     if not np.isfinite(points).all():
         return
     vertices = _fixed(with_border(points))

@@ -35,7 +35,7 @@ from stimuli_builder.video import Picture
 
 # Below the fit's own limit (LIMIT_SD), so that it has room to move from there.
 MAX_SD = 3.0
-"""Coupled parameters start within so many of their standard deviations."""
+"""Coupled parameters start within this many of their standard deviations."""
 
 
 class DetectedStart:

@@ -7,7 +7,7 @@ import type { Point } from "./points";
 
 const COLUMNS = 32;
 const REACH = 3;
-/** A region is so many widths of an eye higher than one eye's opening, and wider than the outer corners of both. */
+/** A region is this many widths of an eye higher than one eye's opening, and wider than the outer corners of both. */
 const MARGIN = 0.75;
 /** Half the width and height of what lids change, in widths of an eye. */
 const LIDS: Point = [0.55, 0.34];
@@ -164,7 +164,7 @@ const LEAST_SCORE = 0.6;
 const LEAST_STILLED = 1;
 const GUESSES_A_PICTURE = 3;
 const GUESSES = 4;
-/** Eyes of one group lie within so many of their distances (one eye: widths) of one another. */
+/** Eyes of one group lie within this many of their distances (one eye: widths) of one another. */
 const SAME_PLACE = 0.35;
 const SAME_SIZE = 0.25;
 

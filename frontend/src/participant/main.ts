@@ -94,7 +94,7 @@ function anotherPerson(keeping: KeptVisit, identity: Identity): void {
   location.reload();
 }
 
-/** The run of this visit. Only here does the browser become known: who reloads the start page has begun nothing. */
+/** The run of this visit. Only here does the browser become known: reloading the start page begins nothing. */
 async function begun({ root, link_token }: Entry, identity: Identity, { language, has_code }: Beginning): Promise<RunStarted> {
   const t = translator(language);
   const start = {

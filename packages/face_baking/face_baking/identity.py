@@ -14,7 +14,7 @@ from face_baking.kit import MODES, SKIN_FACES, Array, FaceKit
 IDENTITIES_FILE = Path(__file__).with_name("identities.toml")
 MAX_SEED = 999_999
 MAX_DEVIATIONS = 1.6
-"""Identity modes stay within so many standard deviations: the kit's scans hold few faces beyond."""
+"""Identity modes stay within this many standard deviations: the kit's scans hold few faces beyond."""
 UNEVEN_CM, UNEVEN_PER_CM = 0.05, 0.3
 """Waves that make the halves of a face differ: size, and how many per cm. The kit's modes are symmetrical."""
 Share = Annotated[float, Field(ge=0, le=1)]

@@ -22,12 +22,12 @@ MEASURED = (
     "server/participation/verdict.py",
     "experiments/rules/playback.py",
 )
-"""What draws clips and judges plays: with another one, plays of before are of something else."""
+"""What draws clips and judges plays: with another one, earlier plays are of something else."""
 
 
 @cache
 def measured_sha256() -> str:
-    """Of all source files that draw and judge."""
+    """SHA-256 of all source files that draw and judge."""
     sources = [ROOT / source for source in MEASURED]
     files = sorted(
         file for source in sources for file in (source.rglob("*.ts") if source.is_dir() else [source])
@@ -62,8 +62,8 @@ class Results:
     """A file of results, one JSON object per line.
 
     Results of one key add up, and what has as many plays as asked for, or more, is not measured again. Those
-    of other sources (`measured_sha256`) stay in the file and count for nothing; so do, with `again`, those
-    of before.
+    of other sources (`measured_sha256`) stay in the file and count for nothing; so do, with `again`,
+    earlier ones.
     """
 
     def __init__(self, path: Path, again: bool = False) -> None:

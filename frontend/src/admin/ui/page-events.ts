@@ -39,7 +39,7 @@ export function useShortcuts(shortcuts: Shortcuts): void {
 
 // Asks before unsaved work is left: by a link of the site, or by closing the tab.
 
-/** Whether work may be replaced by other: saved, or given up by who is asked. */
+/** Whether work may be replaced by other: saved, or given up when asked. */
 export function mayReplace(unsaved: boolean): boolean {
   return !unsaved || window.confirm("You have unsaved work. Open another file anyway?");
 }

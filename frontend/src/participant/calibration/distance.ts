@@ -51,7 +51,7 @@ const ROUNDS = 5;
 const SPEED_PX_PER_MS = 0.1;
 const NEAREST_MM = 200;
 const FURTHEST_MM = 2_000;
-/** The window must let the dot vanish at least for who sits so near; a phone's does not. */
+/** The window must let the dot vanish at least for somebody who sits this near; a phone's does not. */
 const NEEDED_MM = 400;
 const SIDES_PX = 100;
 /** The dot starts this far from the square, well inside the blind spot's near edge. */

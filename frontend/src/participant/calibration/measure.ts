@@ -275,7 +275,7 @@ async function showNotice(session: Session, display: HTMLElement, title: TitleKe
   await choose(session, footer, [{ label: session.t("measure_again"), value: true }]);
 }
 
-/** One measurement by the method of before; by how much it differs, in percent. */
+/** One measurement by the earlier method; by how much it differs, in percent. */
 async function lookAgain(session: Session, display: HTMLElement, before: CalibrationState): Promise<number> {
   const turn: Turn = { session, display, eyebrow: "", round: 1, times: 1, last: before.px_per_mm, remark: "" };
   for (let method = before.method; ; method = method === "card" ? "ruler" : "card") {
@@ -292,7 +292,7 @@ async function measureUntilItFits(session: Session, display: HTMLElement, eyebro
     if (measured === "other") method = method === "card" ? "ruler" : "card";
     else {
       const ruler_check = method === "card" ? await checkedByRuler(session, display, eyebrow, measured.px_per_mm) : null;
-      // Who has a ruler measures with it: a second card would only differ from the first.
+      // Somebody with a ruler measures with it: a second card would only differ from the first.
       if (ruler_check === "differs") method = "ruler";
       else if (await fits(session, display, measured)) return { ...measured, ruler_check };
     }
@@ -368,7 +368,7 @@ async function byRuler(turn: Turn): Promise<Once> {
   }
 }
 
-/** A second look with a ruler, for who has one. */
+/** A second look with a ruler, for people who have one. */
 async function checkedByRuler(
   session: Session,
   display: HTMLElement,

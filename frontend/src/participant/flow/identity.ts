@@ -48,7 +48,7 @@ export class Identity {
     return Object.keys(recruiterQuery(this.search)).length > 0;
   }
 
-  /** True where this tab has shown the visit before: who reloads it is the same person. */
+  /** True where this tab has shown the visit before: a reload is by the same person. */
   get isOfThisTab(): boolean {
     return storageOf("sessionStorage")?.getItem(`${this.key} tab`) === this.read();
   }

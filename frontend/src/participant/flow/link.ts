@@ -18,7 +18,7 @@ export interface Entry {
   kept: Kept | null;
 }
 
-/** Who has begun need not wait long for a server that does not answer. */
+/** Somebody who has begun need not wait long for a server that does not answer. */
 const KEPT_WAIT_MS = 4_000;
 
 /** Ask until the server answers, telling the participant meanwhile. Refusals are thrown. */
@@ -43,7 +43,7 @@ export function isNoAnswer(error: unknown): boolean {
 const fetchLink = (token: string, timeout_ms = 10_000): Promise<LinkState> =>
   call("GET", `/api/links/${encodeURIComponent(token)}`, { timeout_ms });
 
-/** The way back to the recruiter for who takes no part. A visit that an earlier page has kept knows none. */
+/** The way back to the recruiter for people who take no part. A visit that an earlier page has kept knows none. */
 export function wayBack(t: Translate, { way_back }: Partial<Pick<LinkState, "way_back">>): Back {
   return way_back ? { label: t("done_return"), href: filledIn(way_back, location.search) } : null;
 }

@@ -10,7 +10,7 @@ interface Canvas {
 
 const SIDE = 3;
 const PARITY = 4;
-/** Numbers come again after so many frames. */
+/** Numbers repeat after this many frames. */
 const NUMBERS = 256;
 /** The square and its black rim take five of these parts of the clip's height. */
 const PARTS = 12;

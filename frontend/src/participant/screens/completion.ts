@@ -22,7 +22,7 @@ export function nextPerson(t: Translate, identity: Identity): HTMLElement[] {
   return identity.isNamed ? [] : [button(t("new_visit"), () => beginAnew(identity), "plain")];
 }
 
-/** The last page, also of who is screened out. It lies outside the timeline, which clears what its screens have shown. */
+/** The last page, also for people who are screened out. It lies outside the timeline, which clears what its screens have shown. */
 export function showCompletion(
   session: Pick<Session, "t" | "run">,
   display: HTMLElement,

@@ -106,7 +106,7 @@ function say(line: HTMLElement, text: string): void {
   if (line.textContent !== text) line.textContent = text;
 }
 
-/** Where the study screens devices: the choice of who has no larger window or screen. */
+/** Where the study screens devices: the choice for people without a larger window or screen. */
 export function noDevice<Value>(session: Session, value: Value): Choice<Value>[] {
   return session.link.screens_devices ? [{ label: session.t("no_device"), value, kind: "plain" }] : [];
 }

@@ -127,7 +127,7 @@ function restored(view: ViewState): RolesShown[] {
   const began_ms = Date.parse(view.started_at_client);
   const key_at_ms = Number.isNaN(began_ms) ? 0 : began_ms;
   return (view.showings ?? []).map(({ roles, visible_share, refresh_ms, ended_ms, ...measured }, number, { length }) => {
-    // Of clips at once the longest one's log has every frame that the clock drew.
+    // If several clips are shown at once, the log of the longest has every frame that the clock drew.
     const logs = view.clips.filter(({ role }) => roles.includes(role)).map(({ drawn }) => drawn);
     const log = logs.reduce((longest, one) => (one.length > longest.length ? one : longest), []);
     const drawn = log.map(([index, ms]): [number, number] => [index, key_at_ms + ms]);
@@ -162,7 +162,7 @@ export function applyViews(trials: readonly TrialInfo[], sent: readonly ViewIn[]
     trial.views_begun = Math.max(trial.views_begun, view.number);
     // The end of a view has the id of its beginning, and takes its place.
     trial.views = trial.views.filter((one) => one.id !== view.id);
-    // Of a play that has its answer no view is asked for any more.
+    // A play that has its answer needs no view any more.
     if (play <= trial.plays_done) continue;
     trial.views.push({
       id: view.id,
