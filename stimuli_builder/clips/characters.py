@@ -1,11 +1,15 @@
-"""Find a character by name or folder; what reads or draws it is loaded when it is asked for."""
+"""Find a character by name or folder and keep its levels; what reads or draws it is loaded when asked for."""
 
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from experiments.errors import InputError, did_you_mean
 from stimuli_builder.characters.atlas import load_retired
-from stimuli_builder.clips.geometry import Character, Geometry
+from stimuli_builder.clips.geometry import AS_BAKED, Character, Geometry, Movement
+
+if TYPE_CHECKING:
+    from stimuli_builder.clips.levels import LevelSet
 
 SHIPPED_FOLDER = Path(__file__).resolve().parent.parent / "characters" / "data"
 
@@ -84,3 +88,34 @@ def _baked(folder: Path) -> Character:
 
 DRAWN = ("cartoon", "cartoon-willow", "cartoon@2")
 """Characters that are drawn by a program; every other is a folder of pictures."""
+
+
+# The levels that a process keeps while it renders: the last characters at their sizes and movements.
+
+ROOMY_WIDTH_PX = 1200
+"""Up to this width a process keeps two characters; two at the largest size would pass 1.5 GB."""
+
+
+@lru_cache(maxsize=2)
+def kept_levels(
+    character: str,
+    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked again is read again
+    size_px: tuple[int, int],
+    beside: Path | None,
+    movement: Movement = AS_BAKED,
+) -> "LevelSet":
+    """A character (a name, or a folder relative to `beside`) at a picture size, (width, height), as it moves.
+
+    The last two are kept; at great sizes only the last one.
+    """
+    import cv2
+
+    from stimuli_builder.clips.face_movement import moved_levels
+
+    # Every core is already used by a separate process.
+    cv2.setNumThreads(1)
+    if size_px[0] > ROOMY_WIDTH_PX:
+        # Cleared before the next is read: two of this size at once would take too much memory.
+        kept_levels.cache_clear()
+    shown = find_character(character, beside)
+    return moved_levels(shown.levels(size_px), shown.geometry, movement)

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,8 +10,8 @@ from numpy.typing import NDArray
 
 from experiments.errors import InputError
 from stimuli_builder.characters.colour import smooth
-from stimuli_builder.clips.characters import DRAWN, find_character
-from stimuli_builder.clips.geometry import AS_BAKED, Geometry, Movement
+from stimuli_builder.clips.character_levels import DRAWN_LOOKS
+from stimuli_builder.clips.geometry import Geometry, Movement
 from stimuli_builder.clips.kernels import GAMMA
 from stimuli_builder.clips.levels import LevelSet, Light, LowerLid, Window, window_inside
 
@@ -250,7 +249,7 @@ def _skin_shift(character: LevelSet, eyes: list[_Eye], added: Mapping[str, float
     """(height, width, 2) px to the right and down that the frame's skin moves at closure 1."""
     width, height = character.size_px
     shift = np.zeros((height, width, 2), np.float32)
-    fields = FIELDS | ({"brow": DRAWN_BROW} if character.name in DRAWN else {})
+    fields = FIELDS | ({"brow": DRAWN_BROW} if character.name in DRAWN_LOOKS else {})
     for eye in eyes:
         x = (
             (np.arange(width, dtype=np.float64) + 0.5 - eye.fissure.column)
@@ -339,30 +338,3 @@ def _placed(character: LevelSet, down: int, across: int) -> Callable[[], LowerLi
         return replace(lower, rows=rows, columns=columns)
 
     return read
-
-
-# The levels that a process keeps while it renders: the last characters at their sizes and movements.
-
-ROOMY_WIDTH_PX = 1200
-"""Up to this width a process keeps two characters; two at the largest size would pass 1.5 GB."""
-
-
-@lru_cache(maxsize=2)
-def kept_levels(
-    character: str,
-    fingerprint: str,  # noqa: ARG001 - part of the key: a character baked again is read again
-    size_px: tuple[int, int],
-    beside: Path | None,
-    movement: Movement = AS_BAKED,
-) -> LevelSet:
-    """A character (a name, or a folder relative to `beside`) at a picture size, (width, height), as it moves.
-
-    The last two are kept; at great sizes only the last one.
-    """
-    # Every core is already used by a separate process.
-    cv2.setNumThreads(1)
-    if size_px[0] > ROOMY_WIDTH_PX:
-        # Cleared before the next is read: two of this size at once would take too much memory.
-        kept_levels.cache_clear()
-    shown = find_character(character, beside)
-    return moved_levels(shown.levels(size_px), shown.geometry, movement)

@@ -65,7 +65,7 @@ class Look:
     def levels(self) -> "LevelSet":
         """The character's levels as they move, kept for the next clip."""
 
-        from stimuli_builder.clips.face_movement import kept_levels
+        from stimuli_builder.clips.characters import kept_levels
 
         return kept_levels(self.character, self.fingerprint, self.size_px, self.beside, self.movement)
 

@@ -23,9 +23,8 @@ from experiments.manifest import (
     read_manifest,
 )
 from stimuli_builder.clips.build import Progress, silent
-from stimuli_builder.clips.characters import fingerprint, geometry, shipped_names
+from stimuli_builder.clips.characters import fingerprint, geometry, kept_levels, shipped_names
 from stimuli_builder.clips.curves import ClipCurve
-from stimuli_builder.clips.face_movement import kept_levels
 from stimuli_builder.clips.frames import SEAM_MM, eye_light, frame_windows, regions_of, same_picture
 from stimuli_builder.clips.geometry import Movement
 from stimuli_builder.clips.kernels import GAMMA

@@ -7,10 +7,10 @@ import pytest
 
 from experiments.declaration.rendering import RenderSettings
 from stimuli_builder.checks.jobs import OWN_LOOK_QP, first_blink, first_eye
+from stimuli_builder.clips.characters import kept_levels
 from stimuli_builder.clips.curves import ClipCurve
 from stimuli_builder.clips.design_clips import Options, look_of
 from stimuli_builder.clips.encode import encode_clip
-from stimuli_builder.clips.face_movement import kept_levels
 from stimuli_builder.clips.frames import FramePainter
 from tests.stimuli_builder.checks.solvers import decoded
 

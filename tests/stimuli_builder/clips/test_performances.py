@@ -14,8 +14,8 @@ from experiments.errors import InputError
 from experiments.load import load_experiment, parse_experiment
 from experiments.manifest import read_manifest
 from stimuli_builder.clips.build import Machines, build
+from stimuli_builder.clips.characters import kept_levels
 from stimuli_builder.clips.design_clips import TIMER_SHARES, Options, performance_curve, planned_clips
-from stimuli_builder.clips.face_movement import kept_levels
 from stimuli_builder.clips.frames import PAINTED_KEPT, FramePainter
 from stimuli_builder.clips.verify import verify
 
