@@ -23,11 +23,11 @@ from server.core.values import body_problem
 # Written as plain ASGI because Starlette's BaseHTTPMiddleware costs as much as a whole rating.
 
 ANONYMOUS_BYTES = 64 * 1024
-"""Of a JSON body whose sender is not known."""
+"""Largest JSON body of an unknown sender."""
 SIGNED_IN_BYTES = 16 * 1024 * 1024
-"""Of a JSON body under /api/admin from an account: a definition, or a table of clips."""
+"""Largest JSON body of an account under /api/admin: a definition, or a table of clips."""
 HELD_BYTES = 32 * 1024 * 1024
-"""Of all bodies under way in this process, the first `ANONYMOUS_BYTES` of each not counted."""
+"""For all bodies under way in this process together; the first `ANONYMOUS_BYTES` of each are not counted."""
 QUERY_BYTES, MAX_HEADERS = 8 * 1024, 200
 """A query of 60 kB or 3,000 headers took the loop, and with it every rater, for 60 ms."""
 BODY_S = 30.0
@@ -217,7 +217,7 @@ def _count_body(receive: Receive, limit: int) -> Receive:
             raise _too_slow() from None
         received += len(message.get("body", b""))
         if received > limit:
-            # Of what reading a body may raise, FastAPI lets only this exception through.
+            # FastAPI lets only this exception through while it reads a body.
             raise HTTPException(413, too_large(limit).message, {"connection": "close"})
         spent = time.monotonic() - began
         if message.get("more_body") and spent > UPLOAD_GRACE_S and received < spent * UPLOAD_BYTES_PER_S:

@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 # The size of a workbook, looked at before it is opened: a few kilobytes may unfold to all memory.
 
 MAX_BYTES = 512 << 20
-"""Of all parts unpacked; openpyxl takes a few times as much."""
+"""For all parts unpacked; openpyxl takes a few times as much."""
 
 MAX_ELEMENTS = 10_000_000
-"""Of XML in all parts; a cell with a number has two, and takes half a kilobyte."""
+"""XML elements in all parts; a cell with a number has two, and takes half a kilobyte."""
 
 MAX_AREA = 30_000_000
 """Cells from the first to the last, empty ones too, of a sheet, and of its merged areas and links."""
 
 LAST_ROW, LAST_COLUMN = 1_048_576, 16_384
-"""Of a sheet; a link over `A:C` reaches to the last row, one over `1:3` to the last column."""
+"""The last ones of a sheet; a link over `A:C` reaches to the last row, one over `1:3` to the last column."""
 
 _UNFOLDED = {"mergeCell": "merged cells", "hyperlink": "a link over cells", "comment": "a note over cells"}
 """Elements of whose area every cell is made, empty or not."""

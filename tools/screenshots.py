@@ -396,7 +396,7 @@ MOVED, LOWERED = "hazel@7", "alder@8"
 """Whose brow, cheek, squint and gaze are shown moved, and whose lower lid: one face each, for its size."""
 FACES_IN_A_ROW = 6
 QUALITY = 80
-"""Of WebP: a quarter of a JPEG's size that looks alike. Every picture stays in the history of a clone."""
+"""WebP's quality: a quarter of the size of a similar JPEG. Every picture stays in the history of a clone."""
 Rgb = NDArray[np.uint8]
 
 

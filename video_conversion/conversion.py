@@ -296,7 +296,7 @@ def _write(source: Path, conversion: Conversion, target: Path) -> None:
 
 
 def _lowest_psnr_db(source: Path, conversion: Conversion, target: Path) -> float | None:
-    """Of the clip's frames, each decoded again and compared with what went into the encoder."""
+    """The lowest PSNR of the clip's frames, each decoded and compared with the encoder's input."""
     compare, lowest = _Comparison(conversion), float("inf")
     with open_container(target) as container:
         decoded = container.decode(video=0)
@@ -325,7 +325,7 @@ class _Comparison:
         self.graph, self.count = graph, 0
 
     def psnr_db(self, clip: Any, original: Any) -> float:
-        """Of the luminance of one pair, in dB; infinite where no pixel differs."""
+        """PSNR of the luminance of one pair, in dB; infinite if no pixel differs."""
         for end, frame in zip(self.ends, (clip, original), strict=True):
             frame.pts, frame.time_base = self.count, Fraction(1, 1000)
             end.push(frame)

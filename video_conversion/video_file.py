@@ -27,7 +27,7 @@ STANDARD_RATES = tuple(
     )
 )  # fmt: skip
 TOLERANCE = 0.25
-"""Of the time between frames: by so much a frame may begin off the grid and its rate count as constant.
+"""Share of the time between frames by which a frame may be off the grid while the rate counts as constant.
 Containers round times to a millisecond, which at 240 frames per second is 0.12 of it."""
 SNAP = 0.01
 LONE_FRAME_RATE = Fraction(25)
@@ -112,7 +112,7 @@ MAX_PX = 4096
 MAX_FRAMES = 30_000
 MAX_FPS = 1_000
 MAX_PIXELS = 32_000_000_000
-"""Of all frames together: two minutes of 3840 x 2160 pixels at 30 frames per second take 29.9 billion."""
+"""For all frames together: two minutes of 3840 x 2160 pixels at 30 frames per second take 29.9 billion."""
 FORMATS = (
     "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi,mpegts,mpeg,mpegvideo,gif,apng,flv,asf,ogg,mxf,"
     "yuv4mpegpipe,h264,hevc,ivf,dv,nut"

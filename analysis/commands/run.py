@@ -204,7 +204,7 @@ def _definition_in_use(
     if answered["study"].nunique() > 1:
         of_kind = answered[answered["trial_kind"] == shipped.trial.kind]
         answered = answered[answered["study"].isin(of_kind["study"])]
-    # Of several studies of this kind none is chosen here: `load_database` says which there are.
+    # If there are several studies of this kind, none is chosen here: `load_database` lists them.
     if answered["study"].nunique() != 1:
         return shipped, ()
     # The same choice as among the answers themselves, whose columns these are.

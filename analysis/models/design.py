@@ -459,7 +459,7 @@ def _refuse_collinear(data: ModelData) -> None:
     x = data.x
     # At unit length: a covariate in small units would look like a combination of the others.
     scaled = x / np.linalg.norm(x, axis=0)
-    # Of the products (f, f), not of x (n, f): singular values come squared, hence the small tolerance.
+    # Rank of the products (f, f), not of x (n, f): singular values are squared, hence the small tolerance.
     if np.linalg.matrix_rank(scaled.T @ scaled, tol=1e-10) < x.shape[1]:
         # A cell that nobody rated makes effects dependent as well, and is the plainer reason to name.
         if data.terms.effects is not None:

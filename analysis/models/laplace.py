@@ -131,7 +131,7 @@ class CrossedHessian:
         return alone - (self.scaled_b @ items).reshape(r_p.shape), items.reshape(r_i.shape)
 
     def blocks(self) -> tuple[Floats, Floats, Floats]:
-        """Of H^-1: participants' blocks (people, c, c), items' (items, k, k), cross (people, c, items, k)."""
+        """Blocks of H^-1: participants' (people, c, c), items' (items, k, k), cross (people, c, items, k)."""
         n, c, j, k = self.shape
         if self.keeps_people:
             cross = -self.inverse @ self.scaled_b

@@ -125,7 +125,7 @@ Likelihood = LaplaceLikelihood | QuadratureLikelihood
 SD_MAX = float(np.exp(4))
 START_SD = 0.6
 LOG_GAP_BOUNDS = (-12.0, 5.0)
-"""Of the logarithms of the distances between thresholds."""
+"""Bounds of the logarithms of the distances between thresholds."""
 
 NEAR_ZERO = 0.01
 """An SD below this is tried at zero."""

@@ -324,7 +324,7 @@ class SchurComplement:
         return np.asarray(inverse)
 
     def traces_and_scores(self) -> Iterator[tuple[Floats, Floats]]:
-        """Of every term the sum over levels of Z'V^-1 Z (p, p), and Z'V^-1 [X y] (levels, p, m)."""
+        """For every term, the sum over levels of Z'V^-1 Z (p, p), and Z'V^-1 [X y] (levels, p, m)."""
         scores = self._kb - self._k @ self.solution
         for block, factor in zip(self._blocks, self._factors, strict=True):
             at, p = block.columns, factor.shape[0]

@@ -18,7 +18,7 @@ _HIDDEN_IN_WORD = frozenset(
     {f"{_W}del", f"{_W}moveFrom", "{http://schemas.openxmlformats.org/markup-compatibility/2006}Fallback"}
 )
 _SYMBOLS = {0x63: "χ", 0x65: "ε", 0x68: "η", 0x77: "ω", 0x2D: "-", 0xA3: "<", 0xB3: ">", 0xB4: "×"}
-"""Of Word's font Symbol, by the last byte of a sign's number."""
+"""Characters of Word's font Symbol, by the last byte of their number."""
 _NOTES = ("footnotes", "endnotes")
 
 

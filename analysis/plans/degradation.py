@@ -134,7 +134,7 @@ def _scored(
     mean, sd, low, high = _interval(mine.to_numpy(dtype=float))
     differential: tuple[float | None, ...] = (None, None, None)
     if reference is not None and reference in means:
-        # Of participants who rated both: a difference needs one of each.
+        # Only participants who rated both: a difference needs one of each.
         # P.910 adds the highest answer, so that no impairment gives that answer again.
         both = (mine - means[reference]).dropna().to_numpy(dtype=float) + scale.maximum
         at, _, from_, to = _interval(both)

@@ -278,7 +278,7 @@ def _later_runs(
     first_seen: Mapping[str, str],
     rated: Set[str],
 ) -> None:
-    """Of several runs of a participant that no rule excludes, keep the first of those `rated`.
+    """Keep the first `rated` run of each participant among those that no rule excludes.
 
     A run that ended in the practice says nothing, and must not take the place of one that has answers.
     """

@@ -123,7 +123,7 @@ class PairsDesign:
         if not self.tie:
             chosen = rng.binomial(self.repeats, special.expit(logit)).astype(np.float64)
             return np.stack([chosen, self.repeats - chosen], axis=2)
-        # Of comparisons of equal items the share nu / (2 + nu) are ties.
+        # The share nu / (2 + nu) of comparisons of equal items are ties.
         log_nu = np.full_like(logit, np.log(2 * self.tie / (1 - self.tie)))
         shares = special.softmax(np.stack([logit / 2, -logit / 2, log_nu], axis=2), axis=2)
         return rng.multinomial(self.repeats, shares).astype(np.float64)

@@ -33,7 +33,7 @@ class PowerResult:
     se: Floats = field(repr=False)
 
     def smallest_n(self, target: float) -> dict[str, int | None]:
-        """Of every effect the smallest simulated n from which on the power stays at `target` or above."""
+        """For every effect, the smallest simulated n from which on the power stays at `target` or above."""
         smallest: dict[str, int | None] = {}
         for effect, row in zip(self.effects, self.power, strict=True):
             # NaN, where no test exists, is not enough.
@@ -100,7 +100,7 @@ def simulate_power(
             if progress is not None:
                 progress(count)
         power[:, column] = hits / simulations
-    # Of a share of independent data sets (binomial).
+    # The standard error of a share of independent data sets (binomial).
     se = np.sqrt(power * (1 - power) / simulations)
     return PowerResult(
         plan.experiment.name, statistic, alpha, simulations, seed, tuple(sizes), effects, power, se

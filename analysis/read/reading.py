@@ -79,7 +79,7 @@ _COUNT = (
 def rows_that_count(
     rows: pd.DataFrame, keep: NDArray[np.bool_], source: str
 ) -> tuple[NDArray[np.bool_], list[str]]:
-    """Of the rows to `keep` (n,) those that count, and a sentence for each reason that leaves some out."""
+    """Those rows among `keep` (n,) that count, and a sentence for each reason that leaves some out."""
     decisions = []
     bad = [
         (~rows[column].astype(str).isin(good).to_numpy(), what)
@@ -136,7 +136,7 @@ def answers_that_count(
     used: Sequence[str],
     marks: Set[str] = OF_AN_EXPORT,
 ) -> NDArray[np.bool_]:
-    """Of the rows to `keep` (n,) those that count, if the table is an export of the server.
+    """Those rows among `keep` (n,) that count, if the table is an export of the server.
 
     Anyone else's table keeps all its rows: their column `kind` may be a factor, so a table is an export only
     if it has all the columns `marks`. Each reason that leaves rows out is added to the table's decisions.

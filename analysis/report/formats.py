@@ -133,7 +133,7 @@ LINE_CHARACTERS = 100
 """Characters of a table's font in a line of LaTeX's page, some spared."""
 GAP_CHARACTERS = 2
 CM_A_CHARACTER, CM_BESIDE = 0.17, 0.32
-"""Of Word's tables at 9 points: a character, and the space around a cell's text."""
+"""Widths in Word's tables at 9 points: a character, and the space around a cell's text."""
 FEWEST_CM = 2.4
 
 

@@ -24,7 +24,7 @@ Integers = NDArray[np.int64]
 Row = dict[str, Any]
 
 WIDTH = 6
-"""Of the scales of Exp 1 to 3, from 1 to 7, in whose ratings the two spreads below are."""
+"""Width of the scales of Exp 1 to 3, from 1 to 7; the two spreads below are of their ratings."""
 
 TRIAL_SD = 1.1
 """Spread of the ratings within a participant's cell before they are made to sum up."""

@@ -87,7 +87,7 @@ def read_answers(
     for name in named:
         texts_required(table, name, factor=name == by, rows=rows_with_names(table))
     values, answers = numbers(table, x), _binary(table, response)
-    # Of a row without stimulus or answer nothing can be fitted.
+    # A row without stimulus or answer cannot be fitted.
     keep = np.isfinite(values) & np.isfinite(answers)
     across = numbers(table, second) if second else None
     if across is not None:
@@ -105,7 +105,7 @@ def read_answers(
         None if name is None else table.columns[name].astype(object).to_numpy()[keep]
         for name in (participant, by)
     ]
-    # Of the rows that stay: a condition may have been in practice only.
+    # Only conditions of the remaining rows: one may have been in practice only.
     order = () if by is None else names_in_order(table.columns[by], keep)
     orders, said = given_orders({} if by is None else {by: order}, levels)
     return Answers(

@@ -378,7 +378,7 @@ def _fitted(
             where = "" if condition == "all" else f" ({condition})"
             raise InputError(f"{answers.source}{where}: {error}") from error
         if answers.participant is not None:
-            # Of everybody: one person's few answers, or exchanged keys, must not turn the function around.
+            # From everybody's answers: one person's few answers, or exchanged keys, must not reverse it.
             down = pooled[condition].falling
             people += _people(answers, rows, condition, shape, guess, lapse, down)
     means = [mean for condition in pooled if (mean := mean_threshold(people, condition)) is not None]

@@ -140,7 +140,7 @@ class PlaneProfiles:
         self.width, self.span = float(np.ptp(x)), float(np.ptp(z))
 
     def threshold(self, best: float, at: float) -> Interval:
-        """Of the threshold at z = `at`: b1 (x - t) + b2 (z - at)."""
+        """The interval of the threshold at z = `at`: b1 (x - t) + b2 (z - at)."""
 
         def loss(t: float) -> float:
             starts = [self.best[1:], *((1 / (share * self.width), 0.0) for share in BROAD)]

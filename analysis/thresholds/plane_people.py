@@ -347,7 +347,7 @@ def fit_planes(
     labels = np.full(size, "all", dtype=object) if answers.condition is None else answers.condition
     names = np.full(size, "", dtype=object) if answers.participant is None else answers.participant
     if middle is None:
-        # Of all answers, so that conditions are compared at the same place.
+        # The middle of all answers, so that conditions are compared at the same place.
         middle = float(answers.second.min() + answers.second.max()) / 2
     pooled: dict[str, Plane] = {}
     reasons: dict[str, str] = {}

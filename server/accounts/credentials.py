@@ -36,7 +36,7 @@ from server.core.values import hash_token
 T = TypeVar("T")
 SHORTEST, LONGEST = 12, 200
 LEAST_SCORE = 3
-"""Of zxcvbn's 0 to 4: at least 10^8 guesses by somebody who knows people's habits."""
+"""zxcvbn's score, 0 to 4: at least 10^8 guesses by somebody who knows people's habits."""
 JUDGED = 72
 """zxcvbn looks at no more characters."""
 WAITING = 16
@@ -157,7 +157,7 @@ def _step_back() -> None:
 RECOVERY_CODES = 10
 STEP_S = 30
 CODE_BYTES = 15
-"""Of a recovery code: 120 bits, which nobody guesses offline either (ASVS 2.6.2 asks for 112)."""
+"""Length of a recovery code: 120 bits, which nobody guesses offline either (ASVS 2.6.2 requires 112)."""
 WRAPPED, WRAPPING = "wrapped:", b"palpebra second factors"
 
 

@@ -217,7 +217,7 @@ def first_id(session: Session) -> int | None:
 
 
 def unchained_entries(session: Session, first: int | None) -> tuple[int, int | None]:
-    """Of the rows in no chain, how many are older than its first row, and the number of one that is not."""
+    """How many rows outside the chain are older than its first row, and the id of the first that is not."""
     older = true() if first is None else AuditEntry.id < first
     count, stray = func.count(case((older, 1))), func.min(case((not_(older), AuditEntry.id)))
     row = session.execute(select(count, stray).where(AuditEntry.position.is_(None))).one()

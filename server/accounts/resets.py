@@ -21,9 +21,9 @@ from server.models import Account, LetterPurpose, MailedLink
 
 LINK_MINUTES = 30
 MAX_OPEN_LINKS = 3
-"""Of one account and purpose at a time: nobody's inbox can be filled by someone who knows a name."""
+"""Per account and purpose at a time: someone who knows a name cannot fill an inbox."""
 MAX_RESET_LETTERS_A_DAY = 10
-"""Of one account, until one of them is used."""
+"""Per account, until one of them is used."""
 RESERVED_LETTERS, RESERVED_LINKS = 4, 1
 """Of these and of the open links, the part reserved for browsers in which the account signed in before:
 somebody who knows a name and has many addresses uses up all the others."""

@@ -101,7 +101,7 @@ ALIVE = {
     "keepalives_count": "3",
     "tcp_user_timeout": "30000",
 }
-"""Of libpq: a PostgreSQL whose host went without a word is given up within a minute, not after two hours."""
+"""Options of libpq: if PostgreSQL's host disappears, the connection ends within a minute, not two hours."""
 COUNTING_POOL = 2
 SQLITE_AWAY = frozenset(
     (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR)

@@ -23,7 +23,7 @@ from server.core.errors import TooManyRequests
 FORGOTTEN_S = 6 * 3600.0
 """After so long without an event a count goes: shares are full again by then, failures forgiven."""
 KEYS_MAX = 20_000
-"""Of more the oldest go: strangers can invent keys, such as links that do not exist."""
+"""Beyond this number the oldest are dropped: strangers can invent keys, such as links that do not exist."""
 _SWEPT_ONE_IN, _SWEPT_AT_ONCE = 100, 1000
 _REFILLED = (
     "least(:share, shared_counts.amount "
@@ -196,11 +196,11 @@ class BoundedRecords:
 # How many streams of the monitor are open in this worker, of each account and of all.
 
 MAX_STREAMS = 20
-"""Of one account. Each looks at its study every two seconds: 300 made clips wait for a second."""
+"""Per account. Each looks at its study every two seconds: 300 made clips wait for a second."""
 
 
 MAX_STREAMS_OVERALL = 100
-"""Of all accounts together: a laboratory's own people may be many, and raters come first."""
+"""For all accounts together: a laboratory may have many people, and raters come first."""
 
 
 class OpenStreams:

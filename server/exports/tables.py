@@ -367,7 +367,7 @@ def wide_rows(
 
 @dataclass(frozen=True)
 class _RunMeans:
-    """Of a run with answers: its levels between participants, how many answers, and its cells' means."""
+    """A run with answers: its levels between participants, number of answers, and its cells' means."""
 
     run: str
     groups: dict[str, str]

@@ -35,7 +35,7 @@ FrameTime = tuple[
 Part = Literal["practice", "main", "attention", "check"]
 """What a trial is for."""
 Verdict = Literal["good", "uncertain", "flagged", "failed"]
-"""Of the playback rules on a play (`server.participation.verdict`)."""
+"""The verdict of the playback rules on a play (`server.participation.verdict`)."""
 Role = Literal["shown", "left", "right", "first", "second", "reference"]
 DisturbanceCounts = Annotated[
     dict[Annotated[str, StringConstraints(pattern=r"^[a-z_]{1,40}$")], Count], Field(max_length=20)
@@ -127,7 +127,7 @@ def _path_cleared(
     # From the outside in: an outer measured value may hold the faulty one and is cleared as a whole.
     for step in location:
         held = _value_at_step(here, step)
-        # Of a choice between models the fault names the one chosen, which is not a key of the data.
+        # In a choice between models the fault names the chosen one, which is not a key of the data.
         if held is LEFT_OUT and isinstance(here, dict) and step == here.get("kind"):
             continue
         steps.append(str(step))
@@ -409,7 +409,7 @@ class PlaybackLog(BaseModel):
     )
 
 
-# Of the answer only measured parts: a value that the participant chose is never made unknown.
+# Only measured parts of the answer: a value that the participant chose is never made unknown.
 _MEASURED: dict[Path, Any] = {
     **{(name,): None for name in ("rt", "rt_from_first_frame", "time_elapsed", "answered_at_client")},
     ("changes",): LEFT_OUT,

@@ -269,7 +269,7 @@ _JUDGE = Prepared(
 
 
 def waiting_clips(connection: Connection, token_hash: str) -> list[WaitingClip]:
-    """Of each answer of a run whose digest nothing was said of, its clips in their order."""
+    """The clips, in order, of each answer of a run whose digest is not checked yet."""
     return _WAITING.all(connection, {"token_hash": token_hash})
 
 
@@ -279,7 +279,7 @@ def waiting_of_run(connection: Connection, run: int) -> list[WaitingClip]:
 
 
 def unchecked_runs(session: Session) -> list[int]:
-    """The runs with answers whose digest nothing was said of."""
+    """The runs with answers whose digest is not checked yet."""
     query = select(_evidence.c.study_run_id).where(*_unchecked).distinct()
     return list(session.scalars(query.order_by(_evidence.c.study_run_id)))
 

@@ -113,7 +113,7 @@ def forget(session: Session, run: StudyRun) -> None:
 
 
 def readable_identities(session: Session) -> Iterator[bool]:
-    """Of every id that is kept, whether it can be read."""
+    """For every stored id, whether it can be read."""
     secret = session.info[SIGNING_KEY]()
     query = (
         select(StudyRun.public_id, RecruiterIdentity.sealed, IdentityKey.wrapped_key)

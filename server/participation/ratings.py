@@ -99,7 +99,7 @@ def row_of(delivery: SubmittedRating, ruling: Ruling) -> dict[str, Any]:
     """The rating's row."""
     rating, run = delivery.rating, delivery.run
     playback = dict(rating.playback)
-    # Of several clips, in a column of JSON; every other key of the log has its own column.
+    # The logs of several clips are in a column of JSON; every other key of the log has its own column.
     clips: ShownClips | None = playback.pop("clips")
     return {
         "rating_id": delivery.rating_id,

@@ -17,7 +17,7 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 LETTERS = {"good": "g", "uncertain": "u", "flagged": "f", "failed": "x"}
-"""Of a trial in the heat map, by its best verdict; `.` where it was not shown yet."""
+"""A trial's letter in the heat map, by its best verdict; `.` if it was not shown yet."""
 _BETTER = {".": 0, "x": 1, "f": 2, "u": 3, "g": 4}
 RT_MS, ONSET_MS, ONSET_BINS = 250, 10, 11
 """Widths of the bins of response times and of times from key to first frame; the last of these is open."""
@@ -165,7 +165,7 @@ class Play(NamedTuple):
 
 
 COLUMNS = ("heat", "not_good", "counts", "answers", *ClipTime._fields)
-"""Of `RunTally`, without its run."""
+"""The columns of `RunTally`, without its run."""
 
 PlayKey = str
 """Verdict, method and rule of plays, with a blank between them."""

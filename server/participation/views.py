@@ -324,7 +324,7 @@ def _lengths(loaded: LoadedVersion, clips: Iterable[int]) -> dict[str, float]:
 
 
 def _length(loaded: LoadedVersion, view: ViewIn, clips: TrialClips, chosen: Mapping[str, float]) -> float:
-    """Of a view by its trial's clips, or by those it names in their roles that were chosen for the trial."""
+    """A view's length in ms: of the clips it names that were chosen for the trial, else of its own."""
     named: dict[str, str] = {clip.role: clip.clip_sha256 for clip in view.clips}
     own = {role: loaded.clips[ident].sha256 for role, ident in clips.by_role.items()}
     lengths = {role: chosen.get(named.get(role, ""), loaded.lengths[sha256]) for role, sha256 in own.items()}

@@ -342,7 +342,7 @@ def _exclusions(of: DescribedSeries) -> list[str]:
 
 
 def _declared_exclusions(of: DescribedSeries) -> list[str]:
-    """Of the newest version, which the analysis follows: declared before every visit, or later."""
+    """The rules of the newest version, which the analysis follows: declared before every visit, or later."""
     always, _ = _in_force(of, lambda experiment: experiment.exclusions)
     now = {rule.model_dump_json(): rule.reason() for rule in of.experiment.exclusions}
     before = [name for name in dict.fromkeys(now.values()) if name in always]

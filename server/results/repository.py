@@ -172,7 +172,7 @@ def traces_of(session: Session, of: Pool, kind: str) -> list[Trace]:
 
 
 def blinks_of_cells(session: Session, of: Pool) -> dict[str, list[list[float]]]:
-    """Of each cell the blinks of each of its clips in s, clips of performances only."""
+    """For each cell, the times in s of the blinks of each of its clips; clips of performances only."""
     query = select(VersionClip.cell, VersionClip.blinks_s).where(VersionClip.version_id.in_(of.versions()))
     rows = session.execute(query.order_by(VersionClip.id)).all()
     blinks: dict[str, list[list[float]]] = {}

@@ -142,9 +142,9 @@ IDENTITY = ("name", "value", "rule", "kind")
 MAX_ELEMENTS = 2000
 """Elements of lists in a text that is edited: each is compared with each, while others wait."""
 MAX_LINES = 20_000
-"""Of a text that is edited: tomlkit makes an object of each line, empty ones too."""
+"""Most lines of an edited text: tomlkit makes an object of each line, empty ones too."""
 MAX_CUBES = 40_000
-"""Of the parts of dotted keys, all together: 1,500 keys of three parts, some seconds of tomlkit at worst."""
+"""Greatest sum of cubes of the parts of dotted keys: 1,500 keys of three parts take tomlkit some seconds."""
 
 
 # Decision 0550: The builder edits data; the server writes the TOML.

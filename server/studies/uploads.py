@@ -109,7 +109,7 @@ def copy(source: IO[bytes], target: Path, limit: int, called: str = "", within: 
 # What the uploads of one account may hold together; each is removed after a day.
 
 MAX_UPLOADS = 200
-"""Of an account within a day."""
+"""Per account within a day."""
 
 
 @dataclass(frozen=True)
@@ -332,7 +332,7 @@ def _file_called(files: list[Path], name: str) -> Path | None:
 
 KEEP_S = 24 * 3600
 MAX_KEPT_BYTES = 16 * 1024**3
-"""Of all files of one upload."""
+"""For all files of one upload together."""
 
 
 def new_upload(quota: Quota, fps: float | None = None) -> tuple[str, Path]:

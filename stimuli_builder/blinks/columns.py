@@ -110,7 +110,7 @@ _OF_OTHERS = frozenset({"not", "invalid", "blink", "trial", "task", "response"})
 """With these it says something else than which frames were measured: valid_blink, trial_success."""
 CONFIDENCE_COLUMN = "confidence"
 LEAST_CONFIDENCE = 0.5
-"""Of 0 to 1, as OpenFace writes it next to 'success'; below it a frame is likelier wrong than right."""
+"""From 0 to 1, as OpenFace writes it next to 'success'; below it a frame is more likely wrong than right."""
 _WORDS = {"true": True, "1": True, "1.0": True, "false": False, "0": False, "0.0": False}
 
 

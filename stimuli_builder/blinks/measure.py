@@ -136,7 +136,7 @@ def measure_blinks(
         raise not_below(closed, f"any blink of '{series.column}'", widest)
     reason = f"it begins or ends at or below the closed distance {closed:.3g}"
     refused = [RefusedMinimum(blink.minimum, reason) for blink in blinks if blink not in fit]
-    # Of the filtered distance: a difference of raw frames would be noise times the frame rate.
+    # From the filtered distance: a difference of raw frames would be noise times the frame rate.
     velocity = np.gradient(smooth) * series.fps
     measured = [
         _measure(series, blink, number, smooth, velocity, closed, complete_from)

@@ -18,7 +18,7 @@ PROFILE_FPS = 300
 SAMPLES_PER_CLIP_FRAME = 10
 """Samples at 300 fps in one frame of a 30 fps clip."""
 OPEN_PERCENTILE = 85
-"""Of a series' lid distances: the open eye's, in spite of blinks and of a few values that are too wide."""
+"""Percentile of a series' lid distances taken as the open eye's, despite blinks and a few wide values."""
 
 Array = NDArray[np.float64]
 Eye = Literal["left", "right", "both"]

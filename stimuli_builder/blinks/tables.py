@@ -186,7 +186,7 @@ def _spreads(rows: pd.DataFrame) -> dict[str, dict[str, float]]:
         "peak_velocity_to_amplitude_per_s": closing / rows["amplitude"],
     }
     spreads = {name: _spread(values.to_numpy()) for name, values in measures.items()}
-    # Of every blink: one that is left out would join two intervals into one.
+    # Intervals of every blink: one that is left out would join two intervals into one.
     return spreads | {"interval_s": _spread(np.diff(every["minimum_s"].to_numpy()))}
 
 

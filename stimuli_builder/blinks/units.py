@@ -30,7 +30,7 @@ IRIS_FILE = "iris:"
 """Beginning of a scale by the irises of a table that `stimuli iris` wrote."""
 LEAST_IRISES = 5
 MAX_IRIS_RATIO = 1.25
-"""Of both eyes' irises: a head turned by 35 degrees, at the distance of an arm."""
+"""Greatest ratio of both eyes' irises: a head turned by 35 degrees, at the distance of an arm."""
 FISSURES_MM = (3.0, 16.0)
 """Openings of people's eyes; what lies outside has another scale than the one that was given."""
 

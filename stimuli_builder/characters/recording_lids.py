@@ -271,7 +271,7 @@ SHUT_SHARE = 0.002
 OPEN_SHARE = 0.005
 """Eyes that miss less than this of the widest opening are open."""
 MIN_FRAMES = 2
-"""Of an opening, after the open one: the least that shows a lid on its way."""
+"""Fewest frames of an opening, after the open one, that show a lid on its way."""
 RIM_MM = 0.25
 """Lids that touch at their lashes have met behind them: so much of the motion closes no gap that is seen."""
 

@@ -26,7 +26,7 @@ X264 = (
 )
 BT709, LIMITED_RANGE = 1, 1
 M_PERTURB, ZEROES = -6, 255
-"""Of glibc's mallopt: every block of memory is filled with the complement of this byte when it is taken."""
+"""For glibc's mallopt: it fills every block of memory with the complement of this byte when it is taken."""
 RATED = f"{X264}:trellis=0:partitions=i8x8:aq-strength=0.6:me=dia"
 """Fewer bits for smooth skin and a lower CRF keep the lids as sharp as with trellis."""
 _ALONE = f"{X264.replace('keyint=infinite', 'keyint=1')}:aq-mode=0:mbtree=0"

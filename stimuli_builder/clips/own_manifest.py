@@ -92,7 +92,7 @@ def cell_of(levels: dict[str, str], factors: Sequence[str]) -> str:
 
 MAX_NAMED = 5
 CONVERTED_FOLDER = "clips"
-"""Of the folder of videos: where clips go if one of them has to be converted."""
+"""In the folder of videos: where clips go if one of them has to be converted."""
 NO_DEFINITION = hashlib.sha256(b"").hexdigest()
 """Hash of the definition where none was given."""
 

@@ -404,7 +404,7 @@ class _Meters:
         self, name: str, sha256: str, size_px: tuple[int, int], movement: Movement
     ) -> OpeningMeter | None:
         folder_name = name if name in shipped_names() or (self._folder / name).is_dir() else None
-        # Of a character that was baked again, the levels say nothing about this clip.
+        # If the character was baked again, its levels say nothing about this clip.
         if not folder_name or fingerprint(folder_name, self._beside) != sha256:
             return None
         return OpeningMeter(

@@ -55,7 +55,7 @@ def speech_in_subtitles(path: Path, speaker: str | None = None) -> tuple[list[Sp
     if speaker is not None and speaker not in voices:
         spoken = f"; voices: {', '.join(voices)}" if voices else "; the file names no voices"
         raise InputError(f"{path}: there is no speaker '{speaker}'{did_you_mean(speaker, voices)}{spoken}")
-    # Of all voices: the others' last words belong to the dialogue that this person listens to.
+    # The length of all voices: the others' last words belong to the dialogue that this person hears.
     length_s = max((_seconds(caption.end) for caption in captions), default=0.0)
     own = [caption for caption in captions if speaker is None or caption.voice == speaker]
     return join_speech([_stretch(path, caption) for caption in own]), length_s

@@ -45,7 +45,7 @@ def summary_of(kind: str) -> Summarise:
 
 
 def _summarise_unknown(session: Session, study: Study, version: StudyVersion, of: Pool) -> OtherResults:
-    """Of a kind without a file here: what its `counted` (`server.participation.kinds`) counts, by cell."""
+    """Results of a kind without a file: what its `counted` (`server.participation.kinds`) counts, by cell."""
     kind = definition_of(version).trial.kind
     tally = pooled_tally(session, of.runs(), "", ())
     return OtherResults(

@@ -97,7 +97,7 @@ class _Look:
 def recognise(eyes: Sequence[BlinkSeries]) -> list[RecognisedEvents]:
     """Return the events of each series; two series are taken as the two eyes of one face.
 
-    Of three and more, those that one left and one right eye is named by are; others are judged by themselves.
+    If there are more, those named as one left and one right eye are the pair; others are judged separately.
     """
     pair = (0, 1) if len(eyes) == 2 else eye_pair([eye.column for eye in eyes])
     of_pair = {} if pair is None else dict(zip(pair, _of_one_face([eyes[k] for k in pair]), strict=True))

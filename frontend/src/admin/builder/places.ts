@@ -298,7 +298,7 @@ export function filledByPattern(places: readonly Place[], data: Data, pattern: s
       return { ...member, levels: { ...member.levels, ...levels }, exemplar: numbers[index] ?? 1 };
     });
   });
-  // Of two clips for one place the first is in it: one that fits comes before one that was there.
+  // The first of two clips for one place takes it: one that fits comes before one that was there.
   const next = [...fitting, ...strays];
   const known = listAt(data, ["factors"]);
   const knownNames = known.map((factor) => textAt(factor, ["name"]));

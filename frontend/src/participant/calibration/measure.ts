@@ -36,7 +36,7 @@ export interface CardView {
 function cardView(t: Translate, round: number, last: number | null): CardView {
   const upright = window.innerWidth < UPRIGHT_BELOW_PX;
   const largest = upright ? (window.innerWidth - 60) / SHAPE : Math.min(LARGEST_PX, window.innerWidth - 110);
-  /** Of the long side. */
+  /** Length of the long side. */
   let length = randomStart(START_PX[0], Math.min(START_PX[1], largest), last === null ? null : last * CARD_WIDTH_MM);
   let touched = false;
   const id = uniqueId("card");

@@ -154,7 +154,7 @@ function watchFrames(
   const frame: VideoFrameRequestCallback = (_now, metadata) => {
     if (!going) return;
     const [index, at_ms] = [Math.round(metadata.mediaTime * fps), performance.timeOrigin + metadata.expectedDisplayTime];
-    // Of the paused first frame the callback has the time at which it was decoded, long before it was uncovered.
+    // For the paused first frame, the callback reports when it was decoded, long before it was uncovered.
     if (index > 0 && at_ms >= first_at_ms) {
       // A callback can come too late for its frame: the next one says how many were presented meanwhile.
       const between = Math.min(index - (drawn.at(-1)?.[0] ?? 0), metadata.presentedFrames - (presented ?? metadata.presentedFrames)) - 1;

@@ -167,7 +167,7 @@ export class WorkerPlayer implements ClipPlayer {
   }
 
   private broken(reason: string): void {
-    // Of a copy of the keys, since each request that is settled leaves the map.
+    // Loop over a copy of the keys, since each request that is settled leaves the map.
     for (const request of [...this.waiting.keys()]) this.settle(request, new ClipBroken(reason));
   }
 

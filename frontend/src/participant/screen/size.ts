@@ -56,7 +56,7 @@ export function clipHeight(trial: TrialInfo, width: number): number {
 
 /** What was measured of the screen itself. */
 export type Measured = Pick<CalibrationState, "px_per_mm" | "method" | "repeats" | "spread_percent" | "ruler_check">;
-/** Of the viewing distance. */
+/** The measured viewing distance. */
 export type Distance = Pick<CalibrationState, "viewing_distance_mm" | "distance_method" | "distance_spread_mm" | "distance_typed_mm">;
 
 export const NO_DISTANCE: Distance = {

@@ -45,7 +45,7 @@ function seenPart(): Box {
   return { left, top, right: left + view.width, bottom: top + view.height };
 }
 
-/** Of fingers as well: they zoom without another layout, so the size is wrong also where they did so before the trial. */
+/** The zoom, that of fingers included: they zoom without another layout, so the size is wrong also where they did so before the trial. */
 const zoom = (): number => window.devicePixelRatio * (window.visualViewport?.scale ?? 1);
 /** The same on a screen that is turned, another on most other screens. */
 const sides = (): number => screen.width + screen.height;
