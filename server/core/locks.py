@@ -111,6 +111,8 @@ class DatabaseLocks:
         with self._changing:
             # PostgreSQL gives a lock again to the connection that has it: threads are distinguished here.
             if number in self._held or not self._taken(number):
+                if not self._held:
+                    self._close()  # nothing holds it open, and nothing would close it
                 raise LockTaken(name)
             self._held.add(number)
             if len(self._held) == 1:

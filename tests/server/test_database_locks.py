@@ -69,6 +69,19 @@ def test_a_lock_is_held_against_other_processes_and_ones_own_threads(
         pass
 
 
+def test_a_refused_lock_leaves_no_connection_open(services: Services, locks: DatabaseLocks) -> None:
+    def connections() -> int:
+        with services.database.engine.connect() as connection:  # each looks in a transaction of its own
+            query = "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database()"
+            return int(connection.scalar(text(query)) or 0)
+
+    with locks.held("one"):
+        before = connections()
+        with pytest.raises(LockTaken), DatabaseLocks(services.database).held("one"):
+            pass
+        soon(lambda: connections() == before)
+
+
 def test_a_lock_ends_with_a_process_that_is_killed(
     settings: Settings, services: Services, locks: DatabaseLocks
 ) -> None:

@@ -134,6 +134,13 @@ def test_one_clip(
 
 
 @pytest.mark.parametrize("name", shipped_names())
+def test_a_clip_of_each_character_may_have_its_own_size(name: str) -> None:
+    assert geometry(name).clip_size_px() == geometry(name).size_px
+
+
+@pytest.mark.parametrize(
+    "name", [next(name for name in shipped_names() if name.startswith(of)) for of in ("alder-face", "cartoon")]
+)
 def test_a_clip_has_its_characters_own_size(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str
 ) -> None:
