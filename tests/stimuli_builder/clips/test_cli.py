@@ -139,7 +139,8 @@ def test_a_clip_of_each_character_may_have_its_own_size(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [next(name for name in shipped_names() if name.startswith(of)) for of in ("alder-face", "cartoon")]
+    "name",
+    [next(name for name in shipped_names() if name.startswith(of)) for of in ("alder-face", "cartoon")],
 )
 def test_a_clip_has_its_characters_own_size(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str
