@@ -342,7 +342,7 @@ def _same_threshold(result: ThresholdsResult) -> list[str]:
 
 
 def _without_threshold(result: ThresholdsResult) -> list[str]:
-    """Who is in no mean: it then is of people whose thresholds lie among what was shown, and may be off."""
+    """Sentences about people without a threshold: they are left out of the mean, which may be biased."""
     said = []
     for mean in result.means:
         everybody = [one.participant for one in result.people if one.condition == mean.condition]

@@ -21,9 +21,9 @@ Floats = NDArray[np.float64]
 
 RANGE_NODES, PANEL_NODES, GRID = 128, 24, 801
 NEGLIGIBLE = 30.0
-"""What is below exp(-30) times the largest value of an integrand is left out of the integral."""
+"""Values below exp(-30) times the largest value of an integrand are left out of the integral."""
 KNEE = 2.0
-"""So far below its mode, in log s, the outer integrand is a plain power of s."""
+"""This far below its mode, in log s, the outer integrand is a plain power of s."""
 
 
 def range_tail(w: Floats, means: int) -> Floats:

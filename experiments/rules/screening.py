@@ -30,7 +30,7 @@ class AttentionChecks(Declaration):
 
 
 def failed_checks(allowed: int) -> str:
-    """The reason of a rule that allows so many failed attention checks."""
+    """The reason of a rule that allows this number of failed attention checks."""
     return f"{allowed + 1} or more failed attention checks" if allowed else "a failed attention check"
 
 

@@ -323,7 +323,7 @@ async def note_refusal(
     known: BoundedRecords,
     strangers: BoundedRecords,
 ) -> None:
-    """Put a refusal of the admin API into the audit log, so many a minute; the rest are counted.
+    """Record a refusal of the admin API, a limited number per minute; the rest are counted.
 
     Where it cannot be written the refusal is answered all the same, and the log has a line.
 

@@ -112,7 +112,7 @@ def password_fits(password: str, stored: str) -> bool:
 class PasswordWork:
     """The one thread of a process that hashes: each hash takes 64 MB and four cores for a tenth of a second.
 
-    It runs at a lower priority than the threads that serve raters, and only so many wait for it.
+    It runs at a lower priority than the threads that serve raters, and few requests may wait for it.
     """
 
     def __init__(self, waiting: int = WAITING) -> None:

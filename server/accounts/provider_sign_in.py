@@ -512,7 +512,7 @@ def sign_out(database: Database, provider_id: str, ended: ProviderSignOut) -> No
 
 
 def note_failure(database: Database, sign_ins: SignInThrottle, provider_id: str, refusal: ApiError) -> None:
-    """Write a sign-in by a provider down that came to nothing, so many a minute."""
+    """Record a failed sign-in by a provider, a limited number per minute."""
     unwritten = sign_ins.written()
     if unwritten is None:
         return

@@ -81,7 +81,7 @@ def open_session(
 
 
 def record_failure(sign_ins: SignInThrottle, session: Session, account: Account | None) -> None:
-    """Write a failed sign-in down, so many a minute; a name that is nobody's may be a password: not kept."""
+    """Record a failed sign-in, a limited number per minute; an unknown name may be a password: not kept."""
     unwritten = sign_ins.written()
     if unwritten is None:
         return

@@ -78,7 +78,7 @@ class BackOff:
             )
 
     def _left(self, number: int, ago_s: float) -> float:
-        """How long one has to wait after so many failures, the last so long ago; nothing where 0 or less."""
+        """Seconds to wait after `number` failures, the last `ago_s` ago; no wait if 0 or less."""
         over = number - self.free
         return min(LONGEST_WAIT_S, 2.0 ** min(over, 20)) - ago_s if over >= 0 else 0.0
 

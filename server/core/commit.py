@@ -360,7 +360,7 @@ def _compile_statement(statement: Any, dialect: Dialect, columns: list[str]) -> 
 def _result_processors(
     types: Sequence[TypeEngine[Any]], dialect: Dialect, described: Sequence[Any]
 ) -> _ResultProcessors:
-    """What is to be changed of what the driver gives in these columns, which it has described."""
+    """The converters of the driver's values in these columns, as the driver describes them."""
     changes = [
         kind.dialect_impl(dialect).result_processor(dialect, column[1])
         for kind, column in zip(types, described, strict=True)

@@ -170,7 +170,7 @@ class RateLimit:
 
 
 class BoundedRecords:
-    """What is written down of a flood: so many events a minute, and of each kind; others are counted.
+    """A limited record of a flood: some events a minute, and of each kind; the others are counted.
 
     A flood must not fill the audit log, and with it the disk.
     """

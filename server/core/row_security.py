@@ -323,7 +323,7 @@ def _may_take_role(connection: Connection) -> bool:
 
 
 def _try_statement(connection: Connection, statement: str) -> None:
-    """What this user may not do, or another did at this moment, is left."""
+    """Run a statement; skip it if this user may not run it, or another did at the same moment."""
     try:
         with connection.begin_nested():
             connection.exec_driver_sql(statement)

@@ -334,7 +334,7 @@ def _postgres(services: Services) -> Iterator[Finding]:
 
 
 def counts(services: Services) -> Iterator[Finding]:
-    """What is counted with each rating is what a full count of the ratings gives."""
+    """The counts kept with each rating equal a full count of the ratings."""
     compared = Recount(services.versions)
     with services.database.snapshot() as session:
         wrong = sum(1 for _ in compared.differing(session))

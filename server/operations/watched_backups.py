@@ -60,7 +60,7 @@ class DrillResult(BaseModel):
 
 @dataclass(frozen=True)
 class WatchedBackups:
-    """What is known of this installation's backups in the folder of the settings.
+    """This installation's backups in the folder of the settings.
 
     Attributes
     ----------

@@ -43,7 +43,7 @@ MIN_FOR_SPREAD = 8
 GUESSED_BY_CHANCE = 0.01
 """Motion checks are passed where guesses would be right as often with less than this probability."""
 SEEN, POWER = 0.95, 0.99
-"""What people see of motion checks at least, and how surely somebody who sees so many must pass."""
+"""Least share of motion checks that people see, and the probability that somebody who sees it passes."""
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ def trials(connection: Connection, run: int) -> Sequence[Any]:
 
 
 def offered_clip(connection: Connection, run: int, trial_index: int, known: int) -> int | None:
-    """The clip that was chosen for a trial from so many answers; None where none was."""
+    """The clip that was chosen for a trial from `known` answers; None if none was."""
     # A choice is known by how many answers it rests on, which the page sends back.
     query = select(_offers.c.version_clip_id).where(
         _offers.c.study_run_id == run, _offers.c.trial_index == trial_index, _offers.c.known == known

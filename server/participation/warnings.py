@@ -16,7 +16,7 @@ from server.participation import rating_repository
 from server.participation.answer_schemas import WarningShown
 from server.participation.evidence import comparable_answer
 
-# Attention checks: how many of a run have failed, and whether so many end it.
+# Attention checks: how many of a run have failed, and whether that ends the run.
 
 EVENT = "screened_out"
 

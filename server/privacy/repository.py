@@ -155,6 +155,6 @@ def first_seen_after(session: Session, chosen: Select[StudyRun], moment: datetim
 def visits_held(
     session: Session, chosen: Select[StudyRun], seen_before: datetime, limit: int
 ) -> list[StudyRun]:
-    """At most so many of the chosen visits, held; those that another process holds are left to it."""
+    """Lock at most `limit` of the chosen visits; skip those that another process has locked."""
     query = chosen.where(StudyRun.last_seen_at < seen_before).order_by(StudyRun.id).limit(limit)
     return list(session.scalars(query.with_for_update(of=StudyRun, skip_locked=True)))

@@ -201,7 +201,7 @@ def revision(session: Session, study: Study, of: Pool) -> Revision:
 
 
 def large_origins(session: Session, answers: int) -> list[tuple[str, str]]:
-    """Names of open studies with an origin of which there are at least so many answers, previews left out."""
+    """Open studies and their origins with at least this number of answers, previews left out."""
     query = (
         select(Study.name, StudyRun.origin)
         .join(StudyRun, StudyRun.study_id == Study.id)

@@ -46,13 +46,13 @@ def asked_rate(folder: Path) -> float | None:
 
 
 def ask_rate(folder: Path, fps: float | None) -> None:
-    """Ask for clips of so many frames per second, or for each at its own rate; clips are made again."""
+    """Ask for clips of `fps` frames per second, or for each at its own rate; clips are made again."""
     with whole_text(folder / FRAME_RATE) as stream:
         stream.write("" if fps is None else repr(fps))
 
 
 def records_of(folder: Path) -> dict[str, Prepared]:
-    """What has been prepared at the rate that is asked for, by the file's name."""
+    """The clips prepared at the requested rate, by file name."""
     asked = asked_rate(folder)
     try:
         lines = (folder / RECORDS).read_text(encoding="utf-8").splitlines()

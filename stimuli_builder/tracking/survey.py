@@ -71,7 +71,7 @@ COVERED = (
     "suggest closure"
 )
 UNSTEADY = "{} covered, closed tightly or turned away: the lids cannot be tracked reliably"
-"""What an unsteady contour can mean in a recording without steady looks to compare its surroundings with."""
+"""Possible meanings of an unsteady contour in a recording without steady frames to compare with."""
 NAMES = {(True,): "eye", (True, False): "left eye", (False, True): "right eye", (True, True): "both eyes"}
 
 

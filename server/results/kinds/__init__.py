@@ -98,7 +98,7 @@ def counted_results(
 
 LOG = logging.getLogger(__name__)
 FIRST_LOOK_S = 1.0
-"""Who came for the start has been answered by then."""
+"""Requests that came at the start have been answered by then."""
 MANY_ANSWERS = 20_000
 """Fewer are counted while a page loads."""
 
