@@ -110,7 +110,7 @@ def snapshots(services: Services) -> Iterator[Finding]:
         yield _snapshot_finding(settings)
     for path in set_aside(settings):
         advice = f"it contains all answers, including erased ones; when everything works, remove {path}"
-        yield Finding("database of before", "warning", path.name, advice)
+        yield Finding("replaced database", "warning", path.name, advice)
 
 
 def _snapshot_finding(settings: Settings) -> Finding:
