@@ -90,9 +90,9 @@ def test_openings_without_labels_are_those_of_the_lids(tmp_path: Path) -> None:
     opening_mm = find_character(recording.face).geometry.opening_mm
     # The detector's lids were up to 1.8 mm off here.
     assert np.abs(off).max() * opening_mm <= 0.3
-    # These lids slide 0.4 to 0.6 mm over one another once they have met, which counts as opening. The command
-    # states 0.5 mm.
-    assert baked.opening_mm - opening_mm == pytest.approx(0.43, abs=0.2)
+    # These lids slide 0.4 to 0.6 mm over one another once they have met. By their motion alone, that counted
+    # as opening, which was 0.43 mm too large. The command states 0.5 mm.
+    assert baked.opening_mm == pytest.approx(opening_mm, abs=0.35)
     assert "without labels" in (tmp_path / "made" / "report.html").read_text(encoding="utf-8")
 
 
