@@ -72,7 +72,7 @@ def test_results_say_whose_answers_there_are_and_show_them_by_label(dashboard: D
     dashboard.complaints.clear()
     page = dashboard.open(f"/studies/{load_experiment(demo).name}/results")
     runs = counted(PEOPLE[demo], "run")
-    expect(page.get_by_text(f"data series yet, only from simulated people ({runs})")).to_be_visible()
+    expect(page.get_by_text(f"participants yet, only from simulated people ({runs})")).to_be_visible()
     page.get_by_role("button", name="Show simulated").click()
     expect(page.get_by_text("no person gave these answers")).to_be_visible()
     expect(page.get_by_text(LABELS[demo]).first).to_be_visible()
